@@ -1,0 +1,1 @@
+"""Stored pushes, simulated or recorded: how they are made, kept and read."""

@@ -1,0 +1,109 @@
+"""Settings of simulated datasets, free of JAX."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from sainet.engines.config import NoiseConfig, NoiseLevel
+from sainet.errors import BadInput
+
+Setup = Literal["robot", "direct-force"]
+Range = tuple[float] | tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GenerateConfig:
+    """Simulated pushes with the distributions of the paper (section IV-B).
+
+    A range is two numbers, drawn from uniformly, or one that is always taken.
+    """
+
+    setup: Setup = "robot"
+    """robot: the pusher follows a path. direct-force: a force drives it."""
+    disks: int = 2
+    """Number of disks."""
+    pushes: int = 4500
+    """Number of pushes."""
+    engine: str = "planar"
+    """Engine that makes the truth."""
+    assumed_engine: str = "planar"
+    """Engine that makes the prediction s-bar, with the paper's assumed properties."""
+    seed: int = 0
+    """Of everything random; the same seed gives the same bytes."""
+    mass_kg: Range = (0.85, 1.15)
+    """Mass of a disk."""
+    radius_mm: Range = (50.0, 60.0)
+    """Radius of a disk."""
+    table_friction: Range = (0.05, 0.25)
+    """Friction between disks and table, one value for each push."""
+    contact_friction: Range = (0.25,)
+    """Friction between disks, and between disk and pusher."""
+    pusher_radius_mm: float = 4.8
+    """Radius of the pusher."""
+    contact_angle_deg: float = 60.0
+    """Greatest contact angle, to either side of the back of disk 1."""
+    direction_deg: float = 30.0
+    """Greatest angle between the push and the contact normal, to either side."""
+    placement_deg: float = 60.0
+    """Greatest angle at which a disk is placed in front of another."""
+    gap_mm: float = 0.0
+    """Gap between touching disks, and between disk 1 and the pusher, at the start."""
+    stroke_mm: Range = (10.0,)
+    """Length of a push (robot)."""
+    speed_mm_s: Range = (50.0,)
+    """Speed of a push (robot)."""
+    hold_steps: int = 152
+    """Steps that follow the stroke (robot): 48 + 152 = 200."""
+    force_n: float = 8.0
+    """Force on the pusher (direct force)."""
+    force_steps: int = 480
+    """Steps that the force lasts (direct force): 2 s."""
+    noise_level: NoiseLevel = "default"
+    """Size of all noise: none, default or paper-like (three times the default)."""
+    noise: NoiseConfig = field(default_factory=NoiseConfig)
+    """The sources of noise."""
+    chunk_size: int = 250
+    """Pushes that are simulated, written and read at a time."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that no scene can have."""
+        for name in ("disks", "pushes", "chunk_size", "force_steps"):
+            _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
+        _require(self.hold_steps >= 0, "hold-steps", "at least 0", self.hold_steps)
+        _require(self.seed >= 0, "seed", "at least 0", self.seed)
+        for name in ("mass_kg", "radius_mm", "stroke_mm", "speed_mm_s"):
+            _check_range(name, getattr(self, name), positive=True)
+        for name in ("table_friction", "contact_friction"):
+            _check_range(name, getattr(self, name), positive=False)
+        radius = self.pusher_radius_mm
+        _require(_finite(radius) and radius > 0, "pusher-radius-mm", "positive", radius)
+        for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
+            value = getattr(self, name)
+            _require(0 <= value < 90, name, "from 0 to below 90", value)
+        _require(
+            _finite(self.gap_mm) and self.gap_mm >= 0,
+            "gap-mm",
+            "zero or positive (disks must not overlap)",
+            self.gap_mm,
+        )
+
+
+def bounds(values: Range) -> tuple[float, float]:
+    """Return the low and the high end of a range of one or two numbers."""
+    return values[0], values[-1]
+
+
+def _check_range(name: str, values: Range, *, positive: bool) -> None:
+    wanted = "positive, low before high" if positive else "0 or more, low before high"
+    good = len(values) in (1, 2) and all(map(_finite, values))
+    good = good and (0 < values[0] if positive else 0 <= values[0])
+    _require(good and values[0] <= values[-1], name, wanted, values)
+
+
+def _finite(value: float) -> bool:
+    return abs(value) < float("inf")
+
+
+def _require(condition: bool, name: str, wanted: str, value: object) -> None:
+    if not condition:
+        option = "--" + name.replace("_", "-")
+        raise BadInput(f"{option} is {value}; it must be {wanted}.")

@@ -1,0 +1,88 @@
+"""Simulated datasets, chunk by chunk, by as many workers as there are."""
+
+import logging
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, as_completed
+from dataclasses import asdict
+from pathlib import Path
+
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.schema import StoreInfo
+from sainet.datasets.simulate import simulate_chunk, store_info
+from sainet.datasets.store import Store, open_store
+from sainet.datasets.writer import (
+    HASHES,
+    create_arrays,
+    finish,
+    missing_chunks,
+    write_chunk,
+)
+from sainet.runs import open_run
+
+_log = logging.getLogger(__name__)
+
+
+def generate(
+    config: GenerateConfig,
+    out: Path,
+    *,
+    executor: Executor | None = None,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+) -> Store:
+    """Make a dataset of simulated pushes, or go on with an interrupted one.
+
+    However it is interrupted, and whatever the number of workers, the same settings
+    end in the same bytes.
+
+    Args:
+        config: what to simulate.
+        out: the run folder.
+        executor: computes the chunks; None computes them here, one by one.
+        on_pushes: told how many pushes were finished each time some were.
+
+    Raises:
+        RunConflict: the folder holds something else.
+        BadInput: the disk is full.
+    """
+    folder = open_run(out, {"command": "generate", **asdict(config)}, finished_by=HASHES)
+    if folder.is_finished:
+        _log.info("%s is finished already", out)
+        return open_store(out)
+    info = store_info(config)
+    create_arrays(out, info)
+    missing = missing_chunks(out, info)
+    on_pushes(config.pushes - sum(_length(info, i) for i in missing))
+    for index in _each_done(executor, config, out, missing):
+        on_pushes(_length(info, index))
+    finish(out, info)
+    return open_store(out)
+
+
+def make_chunk(config: GenerateConfig, out: Path, index: int) -> int:
+    """Simulate and write one chunk; what a worker does. Returns the index."""
+    write_chunk(out, store_info(config), index, simulate_chunk(config, index))
+    return index
+
+
+def _length(info: StoreInfo, index: int) -> int:
+    part = info.chunk_slice(index)
+    return part.stop - part.start
+
+
+def _each_done(
+    executor: Executor | None, config: GenerateConfig, out: Path, missing: list[int]
+) -> Iterator[int]:
+    """Yield the index of each missing chunk when it is written."""
+    if executor is None:
+        for index in missing:
+            yield make_chunk(config, out, index)
+        return
+    futures: list[Future[int]] = [
+        executor.submit(make_chunk, config, out, index) for index in missing
+    ]
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        for future in futures:
+            future.cancel()

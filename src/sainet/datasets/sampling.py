@@ -1,0 +1,101 @@
+"""Random scenes and pushes with the distributions of the paper (section IV-B)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from sainet.datasets.config import GenerateConfig, Range, bounds
+from sainet.errors import BadInput
+
+_TRIES = 10_000
+_CHUNK_STREAM = 0x5A1  # keeps these draws apart from other uses of the same seed
+
+
+@dataclass(frozen=True)
+class Draws:
+    """The scenes and pushes of one chunk, in NumPy, before anything is simulated."""
+
+    mass: Float[np.ndarray, "push body"]  # kg
+    radius: Float[np.ndarray, "push body"]  # m
+    table_friction: Float[np.ndarray, " push"]
+    contact_friction: Float[np.ndarray, " push"]
+    position: Float[np.ndarray, "push body 2"]  # m
+    contact_angle: Float[np.ndarray, " push"]  # rad
+    direction: Float[np.ndarray, " push"]  # rad
+    stroke: Float[np.ndarray, " push"]  # m
+    speed: Float[np.ndarray, " push"]  # m/s
+
+
+def chunk_generator(seed: int, index: int) -> np.random.Generator:
+    """Return the generator of one chunk: its own, whichever worker draws from it."""
+    return np.random.default_rng([_CHUNK_STREAM, seed, index])
+
+
+def draw(config: GenerateConfig, rng: np.random.Generator, pushes: int) -> Draws:
+    """Draw scenes and pushes.
+
+    Raises:
+        BadInput: no room was found for a disk beside the others.
+    """
+    radius = _uniform(rng, config.radius_mm, (pushes, config.disks)) / 1000
+    contact = np.deg2rad(config.contact_angle_deg)
+    heading = np.deg2rad(config.direction_deg)
+    return Draws(
+        mass=_uniform(rng, config.mass_kg, (pushes, config.disks)),
+        radius=radius,
+        table_friction=_uniform(rng, config.table_friction, (pushes,)),
+        contact_friction=_uniform(rng, config.contact_friction, (pushes,)),
+        position=np.stack([_place(config, rng, one) for one in radius]),
+        contact_angle=rng.uniform(-contact, contact, pushes),
+        direction=rng.uniform(-heading, heading, pushes),
+        stroke=_uniform(rng, config.stroke_mm, (pushes,)) / 1000,
+        speed=_uniform(rng, config.speed_mm_s, (pushes,)) / 1000,
+    )
+
+
+def _uniform(
+    rng: np.random.Generator, values: Range, shape: tuple[int, ...]
+) -> np.ndarray:
+    return rng.uniform(*bounds(values), shape)
+
+
+def _place(
+    config: GenerateConfig, rng: np.random.Generator, radius: Float[np.ndarray, " body"]
+) -> Float[np.ndarray, "body 2"]:
+    """Put disk 1 at the origin and every other in front of one that is there.
+
+    Disks 2 and 3 touch disk 1, as in the paper; it has no room for more, so that each
+    further one touches any of the disks before it.
+    """
+    placed = [np.zeros(2)]
+    gap = config.gap_mm / 1000
+    for body in range(1, len(radius)):
+        for _ in range(_TRIES):
+            parent = 0 if body < 3 else int(rng.integers(body))  # noqa: PLR2004
+            angle = np.deg2rad(rng.uniform(-config.placement_deg, config.placement_deg))
+            reach = radius[parent] + radius[body] + gap
+            place = placed[parent] + reach * np.array([np.cos(angle), np.sin(angle)])
+            if _is_free(place, radius[body], placed, radius, skip=parent):
+                placed.append(place)
+                break
+        else:
+            raise BadInput(
+                f"--disks {config.disks}: disk {body + 1} finds no room without "
+                "overlap; widen --placement-deg or narrow --radius-mm."
+            )
+    return np.stack(placed)
+
+
+def _is_free(
+    place: Float[np.ndarray, " 2"],
+    radius: float,
+    placed: list[np.ndarray],
+    radii: Float[np.ndarray, " body"],
+    *,
+    skip: int,
+) -> bool:
+    others = [i for i in range(len(placed)) if i != skip]
+    return all(
+        np.hypot(*(place - placed[i])) >= radius + radii[i] + 1e-6 for i in others
+    )

@@ -1,0 +1,137 @@
+"""Reading a store: checked when it is opened, then read in parts."""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sainet.datasets.schema import FORMAT_VERSION, StoreInfo, sizes, variables
+from sainet.datasets.writer import ARRAYS, HASHES
+from sainet.errors import BadStore
+from sainet.runs import content_hash, read_json
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Store:
+    """A whole and unharmed dataset of pushes."""
+
+    path: Path
+    info: StoreInfo
+
+    @cached_property
+    def _group(self) -> Any:  # noqa: ANN401
+        import zarr
+
+        return zarr.open_group(self.path / ARRAYS, mode="r")
+
+    def read(
+        self, pushes: slice, names: tuple[str, ...] | None = None
+    ) -> dict[str, np.ndarray]:
+        """Return some pushes of the named arrays (default: all) as NumPy arrays."""
+        chosen = names or tuple(variables(self.info))
+        return {name: self._group[name][pushes] for name in chosen}
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the store as a lazy xarray dataset with dimensions and units."""
+        import xarray
+
+        return xarray.open_zarr(self.path / ARRAYS, consolidated=False, chunks=None)
+
+    @property
+    def content(self) -> str:
+        """The hash of the whole content: what a trained network's card records."""
+        return content_hash((self.path / HASHES).read_bytes())
+
+
+def open_store(path: Path | str, *, verify: bool = True) -> Store:
+    """Open a dataset and check that nothing of it is missing or changed.
+
+    Args:
+        path: the folder that `sainet generate` or `sainet import` made.
+        verify: compare every file with its hash.
+
+    Raises:
+        BadStore: it is missing, unfinished, damaged or of a newer format.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise BadStore(
+            f"{folder}: no such dataset; make one with 'sainet generate' or 'import'."
+        )
+    if not (folder / HASHES).is_file():
+        raise BadStore(
+            f"{folder / HASHES}: missing, so the dataset is unfinished or none; "
+            "run the command that made it again and it goes on."
+        )
+    listing = read_json(folder / HASHES, BadStore)
+    _check_version(folder / HASHES, listing)
+    hashes = listing.get("files")
+    if not isinstance(hashes, dict) or "zarr.json" not in hashes:
+        raise BadStore(f"{folder / HASHES}: files is missing; make the dataset again.")
+    info = _read_info(folder)
+    _check_files(folder, hashes, verify=verify)
+    store = Store(folder, info)
+    _check_shapes(store)
+    return store
+
+
+def _check_version(path: Path, found: dict[str, Any]) -> None:
+    version = found.get("format_version")
+    if version == FORMAT_VERSION:
+        return
+    if isinstance(version, int) and version > FORMAT_VERSION:
+        raise BadStore(
+            f"{path}: format_version is {version}, this sainet reads up to "
+            f"{FORMAT_VERSION}; upgrade sainet."
+        )
+    raise BadStore(
+        f"{path}: format_version is {version!r}, not {FORMAT_VERSION}; "
+        "make the dataset again."
+    )
+
+
+def _read_info(folder: Path) -> StoreInfo:
+    path = folder / ARRAYS / "zarr.json"
+    attributes = read_json(path, BadStore).get("attributes", {})
+    _check_version(path, attributes)
+    names = {field.name for field in fields(StoreInfo)}
+    missing = sorted(names - attributes.keys())
+    if missing:
+        raise BadStore(f"{path}: {missing[0]} is missing; make the dataset again.")
+    known = {name: attributes[name] for name in names}
+    lists = {k: tuple(v) for k, v in known.items() if isinstance(v, list)}
+    return StoreInfo(**(known | lists))
+
+
+def _check_files(folder: Path, hashes: dict[str, str], *, verify: bool) -> None:
+    for name, known in hashes.items():
+        path = folder / ARRAYS / name
+        try:
+            data = path.read_bytes() if verify else None
+            present = data is not None or path.is_file()
+        except OSError:
+            data, present = None, False
+        if not present:
+            raise BadStore(f"{path}: missing; make the dataset again.")
+        if data is not None and content_hash(data) != known:
+            raise BadStore(
+                f"{path}: truncated or changed since it was written; "
+                "make the dataset again."
+            )
+
+
+def _check_shapes(store: Store) -> None:
+    lengths = sizes(store.info)
+    for name, variable in variables(store.info).items():
+        path = store.path / ARRAYS / name
+        if name not in store._group:
+            raise BadStore(f"{path}: missing; make the dataset again.")
+        found = store._group[name].shape
+        wanted = tuple(lengths[d] for d in variable.dimensions)
+        if found != wanted:
+            raise BadStore(f"{path}: shape is {found}, not {wanted}; make it again.")

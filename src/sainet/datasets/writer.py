@@ -1,0 +1,136 @@
+"""Writing a store chunk by chunk; a list of hashes, written last, makes it whole."""
+
+import warnings
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from sainet.datasets.schema import FORMAT_VERSION, StoreInfo, sizes, variables
+from sainet.runs import content_hash, read_json, write_error, write_json
+
+ARRAYS = "pushes.zarr"
+HASHES = "hashes.json"
+PROGRESS = "progress"
+
+
+def create_arrays(folder: Path, info: StoreInfo) -> None:
+    """Create the empty arrays of a store; again is harmless, the bytes are the same.
+
+    Raises:
+        BadInput: the disk is full.
+    """
+    import zarr
+    from zarr.codecs import ZstdCodec
+
+    attributes = {"format_version": FORMAT_VERSION, **asdict(info)}
+    try:
+        group = zarr.open_group(folder / ARRAYS, mode="a", attributes=None)
+        group.attrs.put(attributes)
+        for name, variable in variables(info).items():
+            if name in group:
+                continue
+            shape = tuple(sizes(info)[d] for d in variable.dimensions)
+            group.create_array(
+                name,
+                shape=shape,
+                chunks=(min(info.chunk_size, info.pushes), *shape[1:]),
+                dtype=variable.dtype,
+                fill_value=np.nan if variable.dtype is np.float32 else 0,
+                compressors=ZstdCodec(level=1),
+                dimension_names=variable.dimensions,
+                attributes={"units": variable.units, "long_name": variable.meaning},
+                config={"write_empty_chunks": True},
+            )
+    except OSError as error:
+        raise write_error(folder / ARRAYS, error) from error
+
+
+def write_chunk(folder: Path, info: StoreInfo, index: int, arrays: dict) -> None:
+    """Write one chunk of every array, then the receipt that says so.
+
+    Args:
+        folder: of the run.
+        info: of the store.
+        index: of the chunk.
+        arrays: NumPy arrays by variable name, shape ``[pushes of the chunk, ...]``.
+
+    Raises:
+        BadInput: the disk is full.
+    """
+    import zarr
+
+    try:
+        group = zarr.open_group(folder / ARRAYS, mode="r+")
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            for name, variable in variables(info).items():
+                value = np.asarray(arrays[name], variable.dtype)
+                group[name][info.chunk_slice(index)] = value  # pyright: ignore
+    except OSError as error:
+        raise write_error(folder / ARRAYS, error) from error
+    hashes = {
+        name: content_hash((folder / ARRAYS / name).read_bytes())
+        for name in chunk_files(info, index)
+    }
+    write_json(_receipt(folder, index), hashes)
+
+
+def chunk_files(info: StoreInfo, index: int) -> list[str]:
+    """Return the files of one chunk, relative to the folder of the arrays."""
+    return [
+        "/".join([name, "c", str(index), *["0"] * (len(variable.dimensions) - 1)])
+        for name, variable in variables(info).items()
+    ]
+
+
+def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
+    """Return the chunks that still have to be written.
+
+    A chunk counts as written when its receipt is there and its files are what the
+    receipt says. What an interrupted writer left half-done is removed.
+    """
+    for leftover in (folder / ARRAYS).rglob("*.partial"):
+        leftover.unlink(missing_ok=True)
+    return [i for i in range(info.chunks) if not _is_written(folder, i)]
+
+
+def _is_written(folder: Path, index: int) -> bool:
+    receipt = _receipt(folder, index)
+    if not receipt.is_file():
+        return False
+    return all(
+        _hash_or_none(folder / ARRAYS / name) == known
+        for name, known in read_json(receipt).items()
+    )
+
+
+def _hash_or_none(path: Path) -> str | None:
+    return content_hash(path.read_bytes()) if path.is_file() else None
+
+
+def _receipt(folder: Path, index: int) -> Path:
+    return folder / PROGRESS / f"chunk-{index:06d}.json"
+
+
+def finish(folder: Path, info: StoreInfo) -> None:
+    """Write the list of all hashes, which says that the store is whole."""
+    hashes: dict[str, str] = {}
+    for index in range(info.chunks):
+        hashes |= read_json(_receipt(folder, index))
+    for path in sorted((folder / ARRAYS).rglob("zarr.json")):
+        name = path.relative_to(folder / ARRAYS).as_posix()
+        hashes[name] = content_hash(path.read_bytes())
+    write_json(folder / HASHES, {"format_version": FORMAT_VERSION, "files": hashes})
+    for receipt in (folder / PROGRESS).glob("*.json"):
+        receipt.unlink()
+    (folder / PROGRESS).rmdir()
+
+
+def write_store(folder: Path, info: StoreInfo, arrays: dict) -> None:
+    """Write a store that is already whole in memory."""
+    with warnings.catch_warnings():
+        create_arrays(folder, info)
+    for index in range(info.chunks):
+        part = {k: v[info.chunk_slice(index)] for k, v in arrays.items()}
+        write_chunk(folder, info, index, part)
+    finish(folder, info)

@@ -1,0 +1,58 @@
+"""Work on a batch, spread over all of JAX's devices."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.sharding import AxisType, Mesh, PartitionSpec
+
+BATCH = "batch"  # the name of the mesh axis that batches are sharded over
+
+
+@lru_cache
+def batch_mesh() -> Mesh:
+    """Return the mesh of all devices along one axis, `BATCH`."""
+    return jax.make_mesh((jax.device_count(),), (BATCH,), axis_types=(AxisType.Auto,))
+
+
+@eqx.filter_jit
+def over_devices(function: Callable[..., Any], shared: Any, *batched: Any) -> Any:  # noqa: ANN401
+    """Compute ``function(shared, *batched)`` with the batch split over the devices.
+
+    Args:
+        function: works on any batch size; compiled once for each set of shapes.
+        shared: a tree that every device sees whole.
+        batched: trees whose arrays have the batch as their first axis.
+
+    Returns:
+        What the function returned, its arrays' first axis being the batch.
+    """
+    arrays, static = eqx.partition((shared, batched), eqx.is_array)
+    size = jax.tree.leaves(arrays[1])[0].shape[0]
+    devices = jax.device_count()
+    padding = -size % devices
+    arrays = (arrays[0], jax.tree.map(lambda x: _pad(x, padding), arrays[1]))
+
+    def local(*arrays: Any) -> Any:  # noqa: ANN401
+        shared, batched = eqx.combine(arrays, static)
+        return function(shared, *batched)
+
+    sharded = jax.shard_map(
+        local,
+        mesh=batch_mesh(),
+        in_specs=(PartitionSpec(), PartitionSpec(BATCH)),
+        out_specs=PartitionSpec(BATCH),
+        check_vma=False,
+    )
+    return jax.tree.map(lambda x: x[:size], sharded(*arrays))
+
+
+def _pad(array: jax.Array, padding: int) -> jax.Array:
+    # Repeat the last row: zeros would be scenes that cannot exist.
+    if not padding:
+        return array
+    tail = jnp.repeat(array[-1:], padding, axis=0)
+    return jnp.concatenate([array, tail])

@@ -1,0 +1,1 @@
+"""The project's own engine: disks and a cylindrical pusher on a table, batched."""

@@ -1,0 +1,131 @@
+"""The same solver for many bodies: only the closest pairs are looked at.
+
+Disks that touch without overlapping form a planar graph (a coin graph), so that N
+bodies have at most 3 N - 6 contacts. Keeping that many of the closest pairs loses none
+of them, and the cost grows with the number of bodies instead of its square.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Int
+
+from sainet.engines.planar.bodies import Bodies, Properties
+from sainet.engines.planar.contact import (
+    Contact,
+    ContactImpulse,
+    Side,
+    find_contact,
+    solve_contact,
+)
+from sainet.engines.planar.solver import Step
+from sainet.engines.planar.table import TableImpulse, Twist, solve_table
+
+
+class _Pairs(NamedTuple):
+    first: Int[Array, "pair *batch"]
+    second: Int[Array, "pair *batch"]
+
+
+def contact_budget(body_count: int) -> int:
+    """Return how many pairs of bodies (the pusher included) can touch at once."""
+    every_pair = body_count * (body_count - 1) // 2
+    return every_pair if body_count < 3 else min(every_pair, 3 * body_count - 6)
+
+
+def solve_close_pairs(
+    bodies: Bodies, properties: Properties, limits: tuple[Array, ...], step: Step
+) -> tuple[Twist, ...]:
+    """Return the bodies' velocities, as `solve_all_pairs` does."""
+    stacked = Properties(*map(_stack, properties[:5]), *properties[5:])
+    pairs, contacts = _closest(bodies, stacked, step)
+    limit = jnp.stack(limits)
+    disks = slice(0, len(limits))
+
+    def sweep(_: int, carry: tuple) -> tuple:
+        twist, table, touching = carry
+        table, moved = solve_table(
+            table,
+            Twist(*(part[disks] for part in twist)),
+            limit=limit,
+            arm=stacked.arm,
+            inverse_mass=stacked.inverse_mass[disks],
+            inverse_inertia=stacked.inverse_inertia[disks],
+        )
+        twist = Twist(
+            *(whole.at[disks].set(p) for whole, p in zip(twist, moved, strict=True))
+        )
+        twist, touching = lax.scan(_solve_pair, twist, (pairs, contacts, touching))
+        return twist, table, touching
+
+    zero, none = jnp.zeros_like(limit), jnp.zeros(pairs.first.shape, limit.dtype)
+    start = (
+        Twist(*map(_stack, (bodies.velocity_x, bodies.velocity_y, bodies.spin))),
+        TableImpulse(zero, zero, zero),
+        ContactImpulse(none, none),
+    )
+    twist = lax.fori_loop(0, step.sweeps, sweep, start)[0]
+    return tuple(Twist(*(part[i] for part in twist)) for i in range(len(bodies.x)))
+
+
+def _stack(values: tuple[Array, ...]) -> Array:
+    return jnp.stack(jnp.broadcast_arrays(*values))
+
+
+def _closest(
+    bodies: Bodies, properties: Properties, step: Step
+) -> tuple[_Pairs, Contact]:
+    x, y, radius = _stack(bodies.x), _stack(bodies.y), properties.radius
+    count = len(bodies.x)
+    # The pusher comes first in its pairs, as in the solver of few bodies.
+    second, first = np.triu_indices(count, 1)
+    distance = jnp.hypot(x[second] - x[first], y[second] - y[first])
+    gap = lax.stop_gradient(distance - radius[first] - radius[second])
+    nearest = jnp.argsort(gap, axis=0)[: contact_budget(count)]
+    pairs = _Pairs(jnp.asarray(first)[nearest], jnp.asarray(second)[nearest])
+    contact = find_contact(
+        (
+            _pick(x, pairs.second) - _pick(x, pairs.first),
+            _pick(y, pairs.second) - _pick(y, pairs.first),
+        ),
+        _sides(properties, pairs.first),
+        _sides(properties, pairs.second),
+        friction=jnp.where(
+            pairs.first == count - 1,
+            jnp.broadcast_to(properties.pusher_friction, nearest.shape),
+            jnp.broadcast_to(properties.disk_friction, nearest.shape),
+        ),
+        time_step=step.time_step,
+        recovery=step.recovery,
+    )
+    return pairs, contact
+
+
+def _sides(properties: Properties, index: Array) -> Side:
+    return Side(
+        radius=_pick(properties.radius, index),
+        inverse_mass=_pick(properties.inverse_mass, index),
+        inverse_inertia=_pick(properties.inverse_inertia, index),
+    )
+
+
+def _pick(values: Array, index: Array) -> Array:
+    return jnp.take_along_axis(values, index, axis=0)
+
+
+def _put(values: Array, index: Array, new: Array) -> Array:
+    return jnp.put_along_axis(values, index[None], new[None], axis=0, inplace=False)
+
+
+def _solve_pair(
+    twist: Twist, pair: tuple[_Pairs, Contact, ContactImpulse]
+) -> tuple[Twist, ContactImpulse]:
+    (first, second), contact, impulse = pair
+    one = Twist(*(_pick(part, first[None])[0] for part in twist))
+    other = Twist(*(_pick(part, second[None])[0] for part in twist))
+    impulse, one, other = solve_contact(contact, impulse, one, other)
+    twist = Twist(*(_put(w, first, n) for w, n in zip(twist, one, strict=True)))
+    twist = Twist(*(_put(w, second, n) for w, n in zip(twist, other, strict=True)))
+    return twist, impulse

@@ -1,0 +1,157 @@
+"""The planar engine: one step, and a rollout of many."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import lax
+from jaxtyping import Array, Float
+
+from sainet.engines.base import AbstractEngine
+from sainet.engines.planar.bodies import (
+    Bodies,
+    Properties,
+    to_bodies,
+    to_properties,
+    to_state,
+)
+from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
+from sainet.engines.planar.solver import Step, solve_all_pairs
+from sainet.engines.planar.table import Twist
+from sainet.pushes import Controls, ForceControls, PathControls
+from sainet.scene import Scene, State, Trajectory
+
+
+class PlanarEngine(AbstractEngine):
+    """Disks and a cylindrical pusher on a table, in JAX: batched and differentiable.
+
+    Semi-implicit Euler: the velocities at the end of a step obey Coulomb contact
+    between all pairs without bounce, and the ellipsoidal limit surface of each
+    pressed disk; then ``p(t+1) = p(t) + dt * v(t+1)``. It computes in the precision
+    of what it is given and holds no state of its own.
+    """
+
+    # Mean distance of the pressure from the centre over the radius: 2/3 when it is
+    # uniform, 1 when the disk rests on its rim.
+    pressure_radius_ratio: float | Float[Array, ""] = 2 / 3
+    sweeps: int = eqx.field(static=True, default=10)
+    recovery: float = eqx.field(static=True, default=0.08)  # share of an overlap
+
+    def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
+        """Return the states after each step of the controls."""
+        properties = self._properties(scene, controls)
+
+        def advance(bodies: Bodies, control: Array) -> tuple[Bodies, State]:
+            moved = self._step(scene, properties, bodies, controls, control)
+            return moved, to_state(moved)
+
+        command = jnp.moveaxis(_command(controls), -2, 0)
+        _, states = lax.scan(advance, to_bodies(initial), command)
+        return Trajectory(_time_after_batch(states, len(scene.batch_shape)))
+
+    def step(
+        self,
+        scene: Scene,
+        state: State,
+        controls: Controls,
+        control: Float[Array, "*batch 2"],
+    ) -> State:
+        """Return the state one step later.
+
+        Args:
+            scene: any batch shape.
+            state: of the same batch shape.
+            controls: says how the pusher is driven.
+            control: the pusher's commanded position at the end of the step (m) when
+                it follows a path, the force on it (N) when a force drives it.
+        """
+        properties = self._properties(scene, controls)
+        bodies = to_bodies(state)
+        return to_state(self._step(scene, properties, bodies, controls, control))
+
+    def _properties(self, scene: Scene, controls: Controls) -> Properties:
+        driven = isinstance(controls, ForceControls)
+        inverse_mass = 1 / controls.pusher_mass if driven else 0.0
+        return to_properties(scene, self.pressure_radius_ratio, inverse_mass)
+
+    def _step(
+        self,
+        scene: Scene,
+        properties: Properties,
+        bodies: Bodies,
+        controls: Controls,
+        control: Float[Array, "*batch 2"],
+    ) -> Bodies:
+        bodies = _drive(bodies, controls, control, scene.time_step)
+        limits = _table_limits(scene, properties, bodies)
+        step = Step(scene.time_step, self.recovery, self.sweeps)
+        count = len(bodies.x)
+        every_pair = contact_budget(count) == count * (count - 1) // 2
+        solve = solve_all_pairs if every_pair else solve_close_pairs
+        return _integrate(
+            bodies, solve(bodies, properties, limits, step), scene.time_step
+        )
+
+
+def _command(controls: Controls) -> Float[Array, "*batch time 2"]:
+    return controls.position if isinstance(controls, PathControls) else controls.force
+
+
+def _drive(
+    bodies: Bodies, controls: Controls, control: Array, time_step: float
+) -> Bodies:
+    """Give the pusher the velocity that it has before it touches anything."""
+    x, y = control[..., 0], control[..., 1]
+    if isinstance(controls, PathControls):
+        vx = (x - bodies.x[-1]) / time_step
+        vy = (y - bodies.y[-1]) / time_step
+    else:
+        gain = time_step / controls.pusher_mass
+        keep = 1 - gain * controls.damping
+        vx = keep * bodies.velocity_x[-1] + gain * x
+        vy = keep * bodies.velocity_y[-1] + gain * y
+    return bodies._replace(
+        velocity_x=(*bodies.velocity_x[:-1], vx),
+        velocity_y=(*bodies.velocity_y[:-1], vy),
+    )
+
+
+def _table_limits(
+    scene: Scene, properties: Properties, bodies: Bodies
+) -> tuple[Array, ...]:
+    """Return the greatest impulse of the table's friction on each disk (N s)."""
+    impulse = properties.table_friction * scene.time_step
+    limits = tuple(impulse * weight for weight in properties.weight)
+    if scene.friction_field is None:
+        return limits
+    field = scene.friction_field
+    places = zip(limits, bodies.x, bodies.y, strict=False)
+    return tuple(limit * field.at(x, y) for limit, x, y in places)
+
+
+def _integrate(bodies: Bodies, twists: tuple[Twist, ...], time_step: float) -> Bodies:
+    vx, vy, spin = zip(*twists, strict=True)
+    return Bodies(
+        x=tuple(p + time_step * v for p, v in zip(bodies.x, vx, strict=True)),
+        y=tuple(p + time_step * v for p, v in zip(bodies.y, vy, strict=True)),
+        angle=tuple(a + time_step * w for a, w in zip(bodies.angle, spin, strict=True)),
+        velocity_x=vx,
+        velocity_y=vy,
+        spin=spin,
+    )
+
+
+def _time_after_batch(states: State, batch_axes: int) -> State:
+    """Move the time axis of a scan behind the batch axes."""
+    return State(
+        *(jnp.moveaxis(part, 0, batch_axes) for part in _leaves(states)),
+    )
+
+
+def _leaves(states: State) -> tuple[Array, ...]:
+    return (
+        states.position,
+        states.angle,
+        states.velocity,
+        states.spin,
+        states.pusher_position,
+        states.pusher_velocity,
+    )

@@ -1,0 +1,62 @@
+"""Friction between a pressed disk and the table.
+
+The limit surface (Goyal, Ruina and Papadopoulos 1991) is taken as an ellipsoid: the
+friction force f and torque tau obey ``(f / F)^2 + (tau / (F c))^2 <= 1`` with
+``F = mu m g`` and c the mean distance of the pressure from the centre, 2/3 of the
+radius when it is uniform; a disk that slips dissipates as much as it can.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import lax
+from jaxtyping import Array
+
+
+class TableImpulse(NamedTuple):
+    """What the table did to a disk during a step; the torque is divided by its arm."""
+
+    x: Array  # N s
+    y: Array  # N s
+    turn: Array  # N s
+
+
+class Twist(NamedTuple):
+    """How a disk moves."""
+
+    x: Array  # m/s
+    y: Array  # m/s
+    spin: Array  # rad/s
+
+
+def solve_table(
+    impulse: TableImpulse,
+    twist: Twist,
+    *,
+    limit: Array,
+    arm: Array,
+    inverse_mass: Array,
+    inverse_inertia: Array,
+) -> tuple[TableImpulse, Twist]:
+    """Update a disk's friction impulse and velocity once.
+
+    In the coordinates (f, tau / c) the ellipsoid is a ball of radius `limit` (N s),
+    so that the projection is a scaling and the fixed point is the friction of
+    greatest dissipation. The gain is the largest that is stable in translation and
+    rotation alike.
+    """
+    response = jnp.maximum(inverse_mass, arm * arm * inverse_inertia)
+    gain = 1 / response
+    x = impulse.x - gain * twist.x
+    y = impulse.y - gain * twist.y
+    turn = impulse.turn - gain * arm * twist.spin
+    size = x * x + y * y + turn * turn
+    # The bounds keep both the value and the gradient finite for a disk at rest.
+    inside = limit * lax.rsqrt(jnp.maximum(size, jnp.maximum(limit * limit, 1e-30)))
+    new = TableImpulse(x * inside, y * inside, turn * inside)
+    moved = Twist(
+        x=twist.x + inverse_mass * (new.x - impulse.x),
+        y=twist.y + inverse_mass * (new.y - impulse.y),
+        spin=twist.spin + inverse_inertia * arm * (new.turn - impulse.turn),
+    )
+    return new, moved

@@ -1,0 +1,35 @@
+"""Angles and frames in the plane of the table."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+
+def unit(angle: Float[Array, "*batch"]) -> Float[Array, "*batch 2"]:
+    """Return the unit vector at an angle (rad, counter-clockwise from x)."""
+    return jnp.stack([jnp.cos(angle), jnp.sin(angle)], axis=-1)
+
+
+def rotate(
+    vector: Float[Array, "*batch 2"], angle: Float[Array, "*#batch"]
+) -> Float[Array, "*batch 2"]:
+    """Turn vectors counter-clockwise by an angle (rad)."""
+    cosine, sine = jnp.cos(angle), jnp.sin(angle)
+    x, y = vector[..., 0], vector[..., 1]
+    return jnp.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+
+def direction(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
+    """Return the angle (rad) of a vector, counter-clockwise from x."""
+    return jnp.arctan2(vector[..., 1], vector[..., 0])
+
+
+def norm(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
+    """Return the length of vectors; its gradient at zero is zero, never NaN."""
+    squared = jnp.sum(vector * vector, axis=-1)
+    nonzero = squared > 0
+    return jnp.where(nonzero, jnp.sqrt(jnp.where(nonzero, squared, 1.0)), 0.0)
+
+
+def wrap_angle(angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+    """Bring angles (rad) into [-pi, pi)."""
+    return jnp.mod(angle + jnp.pi, 2 * jnp.pi) - jnp.pi

@@ -1,0 +1,90 @@
+"""One colour, one dash and one label for each model, wherever it is drawn.
+
+The colours differ in hue and in lightness, so that they can be told apart without
+colour vision; each has a lighter twin for dark pages.
+"""
+
+import zlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+INK = "#2f3437"  # text, axes and the truth
+PAPER = "#ffffff"
+DARK_INK = "#e4e2dd"
+DARK_PAPER = "#16191d"
+_LONGEST = 28  # characters of a label; of a longer name, a folder say, the end counts
+
+
+@dataclass(frozen=True)
+class ModelStyle:
+    """How a model is drawn: ``color`` on light pages, ``dark`` on dark ones."""
+
+    name: str
+    label: str
+    color: str  # #rrggbb
+    dark: str  # #rrggbb
+    dash: tuple[float, ...] = ()  # on, off, ... in line widths; empty: solid
+
+    @property
+    def variable(self) -> str:
+        """The CSS variable that holds the colour of the page's theme."""
+        return f"--model-{self.color[1:]}"
+
+
+_KNOWN = {
+    style.name: style
+    for style in (
+        ModelStyle("truth", "Truth", INK, DARK_INK),
+        ModelStyle("physics", "Physics", "#dd7110", "#f2994a"),
+        ModelStyle(
+            "physics-calibrated", "Physics, calibrated", "#b8964a", "#d9bf7c", (4, 2)
+        ),
+        ModelStyle("in", "IN", "#2a6fb5", "#6fb0ee", (7, 2)),
+        ModelStyle("sain", "SAIN", "#00917a", "#35c7a8"),
+        ModelStyle("sain-bullet", "SAIN around Bullet", "#5f8f2f", "#98c766", (5, 1.5)),
+    )
+}
+_SPARE = (
+    ("#8a5aa8", "#c39be0"),
+    ("#b8416f", "#ee85ab"),
+    ("#5b6b7f", "#a3b4c9"),
+    ("#8c4a2f", "#d6957a"),
+)
+
+
+def styles_of(names: Iterable[str]) -> dict[str, ModelStyle]:
+    """Return the style of each name, in order.
+
+    A model that the package does not know gets a spare colour chosen by its name,
+    or the next free one if another model here has it already.
+    """
+    styles: dict[str, ModelStyle] = {}
+    taken: set[int] = set()
+    for name in names:
+        if name in styles:
+            continue
+        styles[name] = _KNOWN.get(name) or _spare_style(name, taken)
+    return styles
+
+
+def style_of(name: str) -> ModelStyle:
+    """Return the style of one model that is drawn alone."""
+    return styles_of([name])[name]
+
+
+def css_variables(*, dark: bool) -> dict[str, str]:
+    """Return every colour of the palette by the name of its CSS variable."""
+    ink, paper = (DARK_INK, DARK_PAPER) if dark else (INK, PAPER)
+    pairs = [(style.color, style.dark) for style in _KNOWN.values()]
+    variables = {f"--model-{pair[0][1:]}": pair[dark] for pair in (*pairs, *_SPARE)}
+    return {"--ink": ink, "--paper": paper, **variables}
+
+
+def _spare_style(name: str, taken: set[int]) -> ModelStyle:
+    slot = zlib.crc32(name.encode()) % len(_SPARE)
+    while slot in taken and len(taken) < len(_SPARE):
+        slot = (slot + 1) % len(_SPARE)
+    taken.add(slot)
+    color, dark = _SPARE[slot]
+    label = name if len(name) <= _LONGEST else f"…{name[1 - _LONGEST :]}"
+    return ModelStyle(name, label, color, dark, (2, 1.5))

@@ -1,0 +1,63 @@
+"""Sets JAX up as strictly as it goes, and finds what only some machines have.
+
+Order matters here: the device count has to be set before the first array exists, and
+the import hook before the first import of `sainet`. Warnings become errors in
+pyproject.toml.
+"""
+
+import os
+import shutil
+from pathlib import Path
+from typing import NamedTuple
+
+import jax
+import pytest
+from jaxtyping import install_import_hook
+
+from support import REPOSITORY, require
+
+jax.config.update("jax_num_cpu_devices", 2)
+jax.config.update("jax_numpy_rank_promotion", "raise")
+
+# Every annotated shape and type of the package is checked while the tests run.
+install_import_hook("sainet", "support.typechecker")
+
+
+class Chromium(NamedTuple):
+    """Where Chromium and its driver are."""
+
+    browser: Path
+    driver: Path
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Starts the slow tests first, so that no worker ends the run alone with one."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+
+
+@pytest.fixture(scope="session")
+def recorded_pushes_folder() -> Path:
+    """The folder of recorded pushes: $SAINET_DATA/mitpush or ../shared/data/mitpush."""
+    named = os.environ.get("SAINET_DATA")
+    folder = Path(named) if named else REPOSITORY.parent / "shared" / "data"
+    folder /= "mitpush"
+    require(
+        (folder / "ellip1_endpoints.csv").is_file(),
+        f"{folder} has no recorded pushes. They are not shipped: they come from the "
+        "evaluation logs in the public repository robinzhoucmu/Pushing, folder "
+        "mcube_data_proc/motion_model_eval_logs. Set SAINET_DATA to the folder "
+        "that holds mitpush/.",
+    )
+    return folder
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Chromium:
+    """Chromium and its driver, as Debian's packages install them."""
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    driver = shutil.which("chromedriver")
+    require(
+        browser and driver,
+        "Chromium or its driver is missing: apt-get install chromium chromium-driver",
+    )
+    return Chromium(Path(str(browser)), Path(str(driver)))

@@ -1,0 +1,26 @@
+"""What tests of several folders share: `from support import require`."""
+
+import os
+from pathlib import Path
+
+import pytest
+from beartype import BeartypeConf, beartype
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+SOURCE = REPOSITORY / "src" / "sainet"
+
+# As pyright reads annotations: an int passes where a float is asked for (PEP 484).
+typechecker = beartype(conf=BeartypeConf(is_pep484_tower=True))
+
+
+def require(condition: object, reason: str) -> None:
+    """Skips the test with the reason where the machine lacks what it needs.
+
+    With SAINET_REQUIRE_ALL=1 it fails instead, so that a run which installed everything
+    cannot pass by testing nothing.
+    """
+    if condition:
+        return
+    if os.environ.get("SAINET_REQUIRE_ALL") == "1":
+        pytest.fail(f"SAINET_REQUIRE_ALL=1 and {reason}", pytrace=False)
+    pytest.skip(reason)

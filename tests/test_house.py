@@ -1,0 +1,182 @@
+"""Guards the house: what a reviewer would otherwise have to count by hand."""
+
+import ast
+import importlib
+import os
+import pkgutil
+import re
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from support import REPOSITORY, SOURCE
+
+LONGEST_MODULE = 300  # lines
+LONGEST_BODY = 40  # lines
+MOST_POSITIONAL = 5  # arguments
+SLOWEST_HELP = 2.0  # s; 0.7 on a quiet machine, and this one may be busy
+
+PICKLERS = {"pickle", "cPickle", "cloudpickle", "dill", "joblib", "marshal", "shelve"}
+NETWORK = {"aiohttp", "ftplib", "http", "httpx", "requests", "socket", "urllib"}
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+MODULES = sorted(SOURCE.rglob("*.py"))
+every_module = pytest.mark.parametrize(
+    "path", MODULES, ids=lambda path: path.relative_to(SOURCE).as_posix()
+)
+
+
+def functions(tree: ast.AST) -> Iterator[Function]:
+    """Every function and method, nested ones too."""
+    return (node for node in ast.walk(tree) if isinstance(node, Function))
+
+
+def body_lines(function: Function) -> int:
+    """Lines from the first statement after the docstring to the last."""
+    documented = ast.get_docstring(function) is not None
+    body = function.body[1:] if documented else function.body
+    return (body[-1].end_lineno or 0) - body[0].lineno + 1 if body else 0
+
+
+def positional(function: Function) -> list[str]:
+    """Names of the arguments that a caller may pass by position."""
+    arguments = function.args.posonlyargs + function.args.args
+    names = [argument.arg for argument in arguments]
+    return names[1:] if names[:1] in (["self"], ["cls"]) else names
+
+
+def public(body: list[ast.stmt]) -> Iterator[Function | ast.ClassDef]:
+    """Public functions and classes of a module, and public methods of those classes."""
+    for node in body:
+        named = isinstance(node, Function | ast.ClassDef)
+        if named and not node.name.startswith("_"):
+            yield node
+            if isinstance(node, ast.ClassDef):
+                yield from public(node.body)
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Top-level names of everything that is imported, at any depth of the file."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.level == 0:
+            yield str(node.module).partition(".")[0]
+
+
+@every_module
+def test_a_module_is_short_and_its_functions_too(path: Path):
+    text = path.read_text()
+    lines = len(text.splitlines())
+    assert lines <= LONGEST_MODULE, f"{lines} lines; is there a second noun in it?"
+    found = list(functions(ast.parse(text)))
+    long = {f.name: body_lines(f) for f in found if body_lines(f) > LONGEST_BODY}
+    assert not long, f"functions of over {LONGEST_BODY} lines: {long}"
+    wide = {f.name: n for f in found if len(n := positional(f)) > MOST_POSITIONAL}
+    assert not wide, f"make some of these keyword-only: {wide}"
+
+
+@every_module
+def test_every_public_name_is_documented(path: Path):
+    tree = ast.parse(path.read_text())
+    bare = [node.name for node in public(tree.body) if not ast.get_docstring(node)]
+    assert not bare
+    assert ast.get_docstring(tree) or not tree.body, "the module has no docstring"
+
+
+@every_module
+def test_no_pickle_and_no_network(path: Path):
+    tree = ast.parse(path.read_text())
+    assert not set(imports(tree)) & (PICKLERS | NETWORK)
+    keywords = [node.arg for node in ast.walk(tree) if isinstance(node, ast.keyword)]
+    assert "allow_pickle" not in keywords, "NumPy's default, False, is what we want"
+
+
+def importable() -> list[str]:
+    """Names of all modules but `__main__`, which would run the command line."""
+    found = pkgutil.walk_packages([str(SOURCE)], prefix="sainet.")
+    names = ["sainet", *(module.name for module in found)]
+    return [name for name in names if not name.endswith("__main__")]
+
+
+@pytest.mark.parametrize("name", importable())
+def test_every_name_in_all_resolves(name: str):
+    module = importlib.import_module(name)
+    exported = getattr(module, "__all__", [])
+    assert sorted(set(exported)) == sorted(exported), "a name stands there twice"
+    missing = [export for export in exported if not hasattr(module, export)]
+    assert not missing
+
+
+def in_a_fresh_python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Runs code where nothing is imported yet, not even this conftest."""
+    command = [sys.executable, "-W", "error", "-c", code, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+def test_importing_the_package_and_its_command_line_leaves_jax_alone():
+    code = "import sys, sainet, sainet.cli; print(sorted(sys.modules))"
+    done = in_a_fresh_python(code)
+    assert done.returncode == 0, done.stderr
+    assert "'sainet.cli'" in done.stdout
+    heavy = {"jax", "jaxlib", "xarray", "zarr", "matplotlib", "scipy"}
+    assert not {name for name in heavy if f"'{name}'" in done.stdout}
+
+
+def test_help_comes_at_once():
+    code = "from sainet.cli import main; main()"
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = in_a_fresh_python(code, "--help")
+        seconds.append(time.perf_counter() - start)
+        assert done.returncode == 0, done.stderr
+        assert "demo" in done.stdout
+    assert min(seconds) < SLOWEST_HELP, seconds
+
+
+def normal(name: str) -> str:
+    """The one spelling of a distribution's name (PEP 503)."""
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def test_the_lock_holds_names_versions_and_hashes_alone():
+    lines = (REPOSITORY / "requirements.lock").read_text().splitlines()
+    entry = re.compile(r"[a-z0-9-]+==[\w.!+]+( ; .+)? \\")
+    digest = re.compile(r"    --hash=sha256:[0-9a-f]{64}( \\)?")
+    stray = [
+        line
+        for line in lines
+        if not (line.startswith("#") or entry.fullmatch(line) or digest.fullmatch(line))
+    ]
+    assert not stray
+    comments = " ".join(line for line in lines if line.startswith("#"))
+    assert "://" not in comments and "index" not in comments
+
+
+def test_the_lock_covers_every_dependency_and_no_torch():
+    lock = (REPOSITORY / "requirements.lock").read_text()
+    locked = set(re.findall(r"^([a-z0-9-]+)==", lock, re.MULTILINE))
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"].values()
+    wanted = [*project["dependencies"], *(each for extra in extras for each in extra)]
+    names = {normal(re.split(r"[\[><=;~! ]", each)[0]) for each in wanted}
+    assert names <= locked, "run `make lock`"
+    assert not {name for name in locked if name.startswith(("torch", "nvidia"))}
+
+
+def test_the_version_stands_in_one_piece():
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    assert importlib.import_module("sainet").__version__ == project["version"]
+    changelog = (REPOSITORY / "CHANGELOG.md").read_text()
+    assert project["version"] in changelog
+
+
+def test_scripts_for_the_shell_are_executable():
+    for name in (".ci/run", "tools/setup.sh"):
+        assert os.access(REPOSITORY / name, os.X_OK), name
