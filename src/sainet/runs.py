@@ -123,13 +123,20 @@ def open_run(
         raise RunConflict(f"{path}: is a file; give --out a folder.")
     if (path / CONFIG).exists():
         _check_same(path, read_json(path / CONFIG, RunConflict), wanted)
-    elif path.is_dir() and any(path.iterdir()):
+    elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
         raise RunConflict(f"{path}: is not empty and no run of sainet; choose another.")
+    for leftover in path.glob(".*.partial"):
+        leftover.unlink(missing_ok=True)
     if not (path / MANIFEST).exists():
         write_json(path / MANIFEST, manifest(devices))
     if not (path / CONFIG).exists():
         write_json(path / CONFIG, wanted)
     return folder
+
+
+def _may_be_left(entry: Path) -> bool:
+    """Whether this is what a run that was killed as it began leaves behind."""
+    return entry.name == MANIFEST or entry.name.endswith(".partial")
 
 
 def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> None:

@@ -1,8 +1,9 @@
 """Settings of simulated datasets, free of JAX."""
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass, field
+from typing import Literal, get_args
 
+from sainet.engines import ENGINES
 from sainet.engines.config import NoiseConfig, NoiseLevel
 from sainet.errors import BadInput
 
@@ -66,6 +67,10 @@ class GenerateConfig:
 
     def __post_init__(self) -> None:
         """Refuse settings that no scene can have."""
+        _require_one_of("setup", self.setup, get_args(Setup))
+        _require_one_of("noise-level", self.noise_level, get_args(NoiseLevel))
+        _require_one_of("engine", self.engine, tuple(ENGINES))
+        _require_one_of("assumed-engine", self.assumed_engine, tuple(ENGINES))
         for name in ("disks", "pushes", "chunk_size", "force_steps"):
             _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
         _require(self.hold_steps >= 0, "hold-steps", "at least 0", self.hold_steps)
@@ -74,8 +79,9 @@ class GenerateConfig:
             _check_range(name, getattr(self, name), positive=True)
         for name in ("table_friction", "contact_friction"):
             _check_range(name, getattr(self, name), positive=False)
-        radius = self.pusher_radius_mm
-        _require(_finite(radius) and radius > 0, "pusher-radius-mm", "positive", radius)
+        for name in ("pusher_radius_mm", "force_n"):
+            value = getattr(self, name)
+            _require(_finite(value) and value > 0, name, "positive", value)
         for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
             value = getattr(self, name)
             _require(0 <= value < 90, name, "from 0 to below 90", value)
@@ -85,6 +91,7 @@ class GenerateConfig:
             "zero or positive (disks must not overlap)",
             self.gap_mm,
         )
+        _check_noise(self.noise)
 
 
 def bounds(values: Range) -> tuple[float, float]:
@@ -97,6 +104,18 @@ def _check_range(name: str, values: Range, *, positive: bool) -> None:
     good = len(values) in (1, 2) and all(map(_finite, values))
     good = good and (0 < values[0] if positive else 0 <= values[0])
     _require(good and values[0] <= values[-1], name, wanted, values)
+
+
+def _check_noise(noise: NoiseConfig) -> None:
+    for name, value in asdict(noise).items():
+        scale = name in ("correlation_time", "friction_length_mm")
+        good = _finite(value) and (value > 0 if scale else value >= 0)
+        wanted = "positive" if scale else "0 or more"
+        _require(good, f"noise.{name}", wanted, value)
+
+
+def _require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
+    _require(value in known, name, "one of " + ", ".join(known), value)
 
 
 def _finite(value: float) -> bool:

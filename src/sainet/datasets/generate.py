@@ -12,6 +12,7 @@ from sainet.datasets.simulate import simulate_chunk, store_info
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import (
     HASHES,
+    clear_progress,
     create_arrays,
     finish,
     missing_chunks,
@@ -47,6 +48,7 @@ def generate(
     folder = open_run(out, {"command": "generate", **asdict(config)}, finished_by=HASHES)
     if folder.is_finished:
         _log.info("%s is finished already", out)
+        clear_progress(out)
         return open_store(out)
     info = store_info(config)
     create_arrays(out, info)

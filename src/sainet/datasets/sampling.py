@@ -8,7 +8,8 @@ from jaxtyping import Float
 from sainet.datasets.config import GenerateConfig, Range, bounds
 from sainet.errors import BadInput
 
-_TRIES = 10_000
+_ARRANGEMENTS = 1_000  # of all disks of a scene
+_TRIES = 50  # for each disk of an arrangement
 _CHUNK_STREAM = 0x5A1  # keeps these draws apart from other uses of the same seed
 
 
@@ -66,25 +67,40 @@ def _place(
     """Put disk 1 at the origin and every other in front of one that is there.
 
     Disks 2 and 3 touch disk 1, as in the paper; it has no room for more, so that each
-    further one touches any of the disks before it.
+    further one touches any of the disks before it. Where the disks that are there
+    leave no room for the next (disk 2 right in the middle, say), all start again.
     """
-    placed = [np.zeros(2)]
-    gap = config.gap_mm / 1000
-    for body in range(1, len(radius)):
-        for _ in range(_TRIES):
-            parent = 0 if body < 3 else int(rng.integers(body))  # noqa: PLR2004
-            angle = np.deg2rad(rng.uniform(-config.placement_deg, config.placement_deg))
-            reach = radius[parent] + radius[body] + gap
-            place = placed[parent] + reach * np.array([np.cos(angle), np.sin(angle)])
-            if _is_free(place, radius[body], placed, radius, skip=parent):
-                placed.append(place)
+    for _ in range(_ARRANGEMENTS):
+        placed = [np.zeros(2)]
+        while len(placed) < len(radius):
+            place = _find_room(config, rng, placed, radius)
+            if place is None:
                 break
+            placed.append(place)
         else:
-            raise BadInput(
-                f"--disks {config.disks}: disk {body + 1} finds no room without "
-                "overlap; widen --placement-deg or narrow --radius-mm."
-            )
-    return np.stack(placed)
+            return np.stack(placed)
+    raise BadInput(
+        f"--disks {config.disks}: no room was found for all of them without "
+        "overlap; widen --placement-deg or narrow --radius-mm."
+    )
+
+
+def _find_room(
+    config: GenerateConfig,
+    rng: np.random.Generator,
+    placed: list[np.ndarray],
+    radius: Float[np.ndarray, " body"],
+) -> Float[np.ndarray, " 2"] | None:
+    """Return where the next disk may go, None when no try found room."""
+    body = len(placed)
+    for _ in range(_TRIES):
+        parent = 0 if body < 3 else int(rng.integers(body))  # noqa: PLR2004
+        angle = np.deg2rad(rng.uniform(-config.placement_deg, config.placement_deg))
+        reach = radius[parent] + radius[body] + config.gap_mm / 1000
+        place = placed[parent] + reach * np.array([np.cos(angle), np.sin(angle)])
+        if _is_free(place, radius[body], placed, radius, skip=parent):
+            return place
+    return None
 
 
 def _is_free(

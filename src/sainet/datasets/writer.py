@@ -1,5 +1,6 @@
 """Writing a store chunk by chunk; a list of hashes, written last, makes it whole."""
 
+import shutil
 import warnings
 from dataclasses import asdict
 from pathlib import Path
@@ -89,7 +90,7 @@ def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
     A chunk counts as written when its receipt is there and its files are what the
     receipt says. What an interrupted writer left half-done is removed.
     """
-    for leftover in (folder / ARRAYS).rglob("*.partial"):
+    for leftover in folder.rglob("*.partial"):
         leftover.unlink(missing_ok=True)
     return [i for i in range(info.chunks) if not _is_written(folder, i)]
 
@@ -121,9 +122,12 @@ def finish(folder: Path, info: StoreInfo) -> None:
         name = path.relative_to(folder / ARRAYS).as_posix()
         hashes[name] = content_hash(path.read_bytes())
     write_json(folder / HASHES, {"format_version": FORMAT_VERSION, "files": hashes})
-    for receipt in (folder / PROGRESS).glob("*.json"):
-        receipt.unlink()
-    (folder / PROGRESS).rmdir()
+    clear_progress(folder)
+
+
+def clear_progress(folder: Path) -> None:
+    """Remove the receipts of a finished store; again is harmless."""
+    shutil.rmtree(folder / PROGRESS, ignore_errors=True)
 
 
 def write_store(folder: Path, info: StoreInfo, arrays: dict) -> None:

@@ -20,7 +20,7 @@ from sainet.engines.planar.contact import (
     find_contact,
     solve_contact,
 )
-from sainet.engines.planar.solver import Step
+from sainet.engines.planar.solver import Step, every_pair
 from sainet.engines.planar.table import TableImpulse, Twist, solve_table
 
 
@@ -31,8 +31,8 @@ class _Pairs(NamedTuple):
 
 def contact_budget(body_count: int) -> int:
     """Return how many pairs of bodies (the pusher included) can touch at once."""
-    every_pair = body_count * (body_count - 1) // 2
-    return every_pair if body_count < 3 else min(every_pair, 3 * body_count - 6)
+    every = body_count * (body_count - 1) // 2
+    return every if body_count < 3 else min(every, 3 * body_count - 6)
 
 
 def solve_close_pairs(
@@ -44,7 +44,7 @@ def solve_close_pairs(
     limit = jnp.stack(limits)
     disks = slice(0, len(limits))
 
-    def sweep(_: int, carry: tuple) -> tuple:
+    def sweep(_: Array, carry: tuple) -> tuple:
         twist, table, touching = carry
         table, moved = solve_table(
             table,
@@ -79,11 +79,13 @@ def _closest(
 ) -> tuple[_Pairs, Contact]:
     x, y, radius = _stack(bodies.x), _stack(bodies.y), properties.radius
     count = len(bodies.x)
-    # The pusher comes first in its pairs, as in the solver of few bodies.
-    second, first = np.triu_indices(count, 1)
+    first, second = np.array(every_pair(count)).T
     distance = jnp.hypot(x[second] - x[first], y[second] - y[first])
     gap = lax.stop_gradient(distance - radius[first] - radius[second])
     nearest = jnp.argsort(gap, axis=0)[: contact_budget(count)]
+    # In the order of all pairs: sweeps are few, so that their order shows, and which
+    # of two touching pairs is closer is a matter of rounding.
+    nearest = jnp.sort(nearest, axis=0)
     pairs = _Pairs(jnp.asarray(first)[nearest], jnp.asarray(second)[nearest])
     contact = find_contact(
         (

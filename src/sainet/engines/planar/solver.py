@@ -40,12 +40,12 @@ def solve_all_pairs(
         limits: of the table's friction on each disk over the step, N s.
         step: the numbers of the step.
     """
-    pairs = _pairs(len(bodies.x))
+    pairs = every_pair(len(bodies.x))
     contacts = [_static_contact(bodies, properties, pair, step) for pair in pairs]
     zero = jnp.zeros_like(bodies.x[0])
     disks = range(len(limits))
 
-    def sweep(_: int, carry: tuple) -> tuple:
+    def sweep(_: Array, carry: tuple) -> tuple:
         twists, table, touching = (list(part) for part in carry)
         for disk in disks:
             table[disk], twists[disk] = solve_table(
@@ -71,7 +71,7 @@ def solve_all_pairs(
     return lax.fori_loop(0, step.sweeps, sweep, start)[0]
 
 
-def _pairs(count: int) -> list[tuple[int, int]]:
+def every_pair(count: int) -> list[tuple[int, int]]:
     """List the pairs, the pusher's (the last body's) first: it drives the others."""
     pusher = count - 1
     driven = [(pusher, disk) for disk in range(pusher)]

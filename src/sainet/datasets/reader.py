@@ -1,0 +1,121 @@
+"""Batches of stored pushes in a random order that the iteration alone decides."""
+
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+import numpy as np
+
+from sainet.datasets.store import Store
+
+_WINDOW = 8  # chunks that are shuffled together
+_ORDER_STREAM = 0x0DE5
+
+
+@dataclass
+class ChunkCache:
+    """Chunks of some arrays, as many as fit in memory, the last used ones."""
+
+    store: Store
+    names: tuple[str, ...]
+    limit: int  # bytes
+    _chunks: OrderedDict[int, dict[str, np.ndarray]] = field(default_factory=OrderedDict)
+    _size: int = 0
+
+    def get(self, index: int) -> dict[str, np.ndarray]:
+        """Return one chunk, read from disk unless it was used lately."""
+        if index not in self._chunks:
+            chunk = self.store.read(self.store.info.chunk_slice(index), self.names)
+            self._chunks[index] = chunk
+            self._size += _bytes(chunk)
+        self._chunks.move_to_end(index)
+        while self._size > self.limit and len(self._chunks) > 1:
+            self._size -= _bytes(self._chunks.popitem(last=False)[1])
+        return self._chunks[index]
+
+    def gather(self, pushes: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the arrays of some pushes, in their order."""
+        owners = pushes // self.store.info.chunk_size
+        picked: dict[str, np.ndarray] = {}
+        for owner in np.unique(owners):
+            here = np.flatnonzero(owners == owner)
+            rows = pushes[here] - owner * self.store.info.chunk_size
+            for name, array in self.get(int(owner)).items():
+                shape = (len(pushes), *array.shape[1:])
+                picked.setdefault(name, np.empty(shape, array.dtype))[here] = array[rows]
+        return picked
+
+
+def _bytes(chunk: dict[str, np.ndarray]) -> int:
+    return sum(array.nbytes for array in chunk.values())
+
+
+@dataclass
+class BatchReader:
+    """Reads batches of pushes of one length, never the store whole.
+
+    Which pushes make up a batch depends on the seed and the iteration alone, so that
+    an interrupted training goes on with the same batches.
+    """
+
+    store: Store
+    names: tuple[str, ...]
+    batch_size: int
+    seed: int
+    pushes: int  # of the store's first ones, that are read
+    memory: int = 1 << 30  # bytes
+
+    def __post_init__(self) -> None:
+        """Look up the lengths and start the thread that reads ahead."""
+        self._cache = ChunkCache(self.store, self.names, self.memory)
+        steps = self.store.read(slice(0, self.pushes), ("steps",))["steps"]
+        self._steps = steps
+        self._order = lru_cache(maxsize=2)(self._batches_of_epoch)
+        self._thread = ThreadPoolExecutor(1)
+        self._ahead: dict[int, object] = {}
+
+    def batch(self, iteration: int) -> tuple[dict[str, np.ndarray], int]:
+        """Return the arrays of a batch and the number of steps of its pushes."""
+        ready = self._ahead.pop(iteration, None)
+        ready = ready or self._thread.submit(self._read, iteration)
+        self._ahead = {iteration + 1: self._thread.submit(self._read, iteration + 1)}
+        return ready.result()  # pyright: ignore[reportAttributeAccessIssue]
+
+    def close(self) -> None:
+        """Stop reading ahead."""
+        self._thread.shutdown(cancel_futures=True)
+
+    def _read(self, iteration: int) -> tuple[dict[str, np.ndarray], int]:
+        epoch, place = 0, iteration
+        while place >= len(self._order(epoch)):
+            whole = len(self._order(epoch))
+            epoch, place = epoch + place // whole, place % whole
+        chosen = self._order(epoch)[place]
+        return self._cache.gather(chosen), int(self._steps[chosen[0]])
+
+    def _batches_of_epoch(self, epoch: int) -> list[np.ndarray]:
+        """Shuffle chunks, then pushes within a few chunks; cut them into batches."""
+        rng = np.random.default_rng([_ORDER_STREAM, self.seed, epoch])
+        size = self.store.info.chunk_size
+        chunks = rng.permutation(-(-self.pushes // size))
+        batches = []
+        for start in range(0, len(chunks), _WINDOW):
+            window = [
+                np.arange(c * size, min((c + 1) * size, self.pushes))
+                for c in chunks[start : start + _WINDOW]
+            ]
+            batches.append(rng.permutation(np.concatenate(window)))
+        return self._cut(np.concatenate(batches))
+
+    def _cut(self, order: np.ndarray) -> list[np.ndarray]:
+        """Cut into whole batches of one length; a length too rare is repeated."""
+        batches = []
+        for steps in np.unique(self._steps):
+            same = order[self._steps[order] == steps]
+            short = max(self.batch_size - len(same), 0)
+            same = np.concatenate([same, np.resize(same, short)])
+            whole = len(same) // self.batch_size
+            batches += np.split(same[: whole * self.batch_size], whole)
+        place = {int(push): at for at, push in enumerate(order)}
+        return sorted(batches, key=lambda batch: place[int(batch[0])])

@@ -1,0 +1,243 @@
+"""Several models on the same stored pushes, side by side."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.schema import published_name, simulated_name, variables
+from sainet.datasets.store import Store
+from sainet.devices import over_devices
+from sainet.errors import BadInput
+from sainet.evaluation.metrics import (
+    REFERENCE_DISTANCE,
+    PushErrors,
+    final_errors,
+    final_pose,
+    push_errors,
+    travel_mm,
+)
+from sainet.evaluation.rows import comparison_rows, error_rows
+from sainet.models.dynamics import AbstractDynamics
+from sainet.models.registry import NamedDynamics
+
+PAPER_STEPS = 200
+_BATCH = 256  # pushes that are predicted at a time: one compilation for each length
+
+
+@dataclass
+class Evaluation:
+    """Errors of every model for every push; `to_dict` is what tables show."""
+
+    errors: dict[str, PushErrors]
+    published: dict[str, PushErrors]
+    travel_mm: Float[np.ndarray, "push body"]
+    groups: tuple[str | None, ...]  # of each push
+    reference: float  # m, that trans (%) is relative to
+    curves: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return rows, published rows and paired comparisons as JSON values."""
+        pairs = combinations(self.errors.items(), 2)
+        parts = list(self._parts())
+        return {
+            "rows": [
+                row
+                for group, part in parts
+                for name, errors in self.errors.items()
+                for row in error_rows(
+                    name,
+                    _select(errors, part),
+                    self.travel_mm[part],
+                    group=group,
+                    reference=self.reference,
+                )
+            ],
+            "published": [
+                _without_intervals(row)
+                for group, part in parts
+                for name, errors in self.published.items()
+                for row in error_rows(
+                    name,
+                    _select(errors, part),
+                    self.travel_mm[part],
+                    group=group,
+                    reference=self.reference,
+                )
+            ],
+            "comparisons": [
+                row
+                for (one, a), (other, b) in pairs
+                for group, part in parts
+                for row in comparison_rows(
+                    (other, _select(b, part)), (one, _select(a, part)), group=group
+                )
+            ],
+        }
+
+    def _parts(self) -> Iterator[tuple[str | None, np.ndarray]]:
+        """Yield each group and which pushes belong to it."""
+        owners = np.array([group or "" for group in self.groups])
+        for name in sorted(set(owners)):
+            yield name or None, owners == name
+
+
+def _select(errors: PushErrors, part: np.ndarray) -> PushErrors:
+    return PushErrors(**{name: value[part] for name, value in vars(errors).items()})
+
+
+def _without_intervals(row: dict[str, Any]) -> dict[str, Any]:
+    return {k: v for k, v in row.items() if not k.endswith("_interval")}
+
+
+def evaluate(
+    models: Sequence[NamedDynamics],
+    store: Store,
+    *,
+    steps: int | None = None,
+    force: bool = False,
+    on_pushes: Callable[[str, int], None] = lambda model, pushes: None,
+) -> Evaluation:
+    """Predict every stored push with every model and measure the errors.
+
+    Args:
+        models: at least one.
+        store: the pushes.
+        steps: to predict; 0 is all, None the paper's 200 (recorded pushes: all).
+        force: use networks on other pushes than they were trained for.
+        on_pushes: told the model and how many pushes were predicted.
+
+    Raises:
+        BadCheckpoint: a network does not fit the pushes.
+        BadInput: two models have the same name.
+    """
+    names = [model.name for model in models]
+    if len(set(names)) < len(names):
+        raise BadInput(f"--model: {', '.join(names)} are not all different; rename one.")
+    for model in models:
+        if not force:
+            model.check_fits(store.info.kind, store.info.time_step)
+    arrays = _read(store)
+    limit = _limit(store, steps)
+    parts = list(_parts_of_one_length(arrays, limit))
+    errors: dict[str, PushErrors] = {}
+    for model in models:
+        poses = _predict_all(model, store, arrays, parts, on_pushes)
+        errors[model.name] = _join(
+            [
+                push_errors(poses[i], *_truth(arrays, part, length))
+                for i, (part, length) in enumerate(parts)
+            ],
+            parts,
+        )
+    return _evaluation(store, arrays, errors, parts)
+
+
+def _read(store: Store) -> dict[str, np.ndarray]:
+    unused = {simulated_name(engine) for engine in store.info.assumed_engines}
+    names = tuple(n for n in variables(store.info) if n not in {*unused, "measured"})
+    return store.read(slice(None), names)
+
+
+def _limit(store: Store, steps: int | None) -> int:
+    if steps is None:
+        recorded = store.info.engine == "recorded"
+        return store.info.steps if recorded else min(PAPER_STEPS, store.info.steps)
+    if not 0 <= steps <= store.info.steps:
+        raise BadInput(
+            f"--steps is {steps}; {store.path} has {store.info.steps} (0 takes all)."
+        )
+    return steps or store.info.steps
+
+
+def _parts_of_one_length(
+    arrays: dict[str, np.ndarray], limit: int
+) -> Iterator[tuple[np.ndarray, int]]:
+    """Yield the indices of pushes of one length, and how much of it is predicted."""
+    lengths = np.minimum(arrays["steps"], limit)
+    for length in np.unique(lengths):
+        yield np.flatnonzero(lengths == length), int(length)
+
+
+def _truth(
+    arrays: dict[str, np.ndarray], part: np.ndarray, steps: int
+) -> tuple[np.ndarray, np.ndarray]:
+    pose = arrays["truth"][part, :steps, :, :3].astype(np.float64)
+    return pose, arrays["pose_observed"][part, :steps] > 0
+
+
+def _predict_all(
+    model: NamedDynamics,
+    store: Store,
+    arrays: dict[str, np.ndarray],
+    parts: list[tuple[np.ndarray, int]],
+    on_pushes: Callable[[str, int], None],
+) -> list[np.ndarray]:
+    """Return the predicted poses of each part, ``[push, time, body, 3]``."""
+    poses = []
+    for part, steps in parts:
+        found = []
+        for start in range(0, len(part), _BATCH):
+            rows = part[start : start + _BATCH]
+            whole = np.resize(rows, min(_BATCH, len(part)))
+            batch = to_batch(_rows(arrays, whole), store.info, steps=steps)
+            pose = over_devices(_predict_pose, model.dynamics, batch)
+            found.append(np.asarray(pose, np.float64)[: len(rows)])
+            on_pushes(model.name, len(rows))
+        poses.append(np.concatenate(found))
+    return poses
+
+
+def _rows(arrays: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
+    return {name: array[rows] for name, array in arrays.items()}
+
+
+def _predict_pose(
+    dynamics: AbstractDynamics, batch: PushBatch
+) -> Float[Array, "push time body 3"]:
+    carry = dynamics.begin(batch.scene, batch.initial)
+    _, trajectory = dynamics.advance(batch.scene, carry, batch.controls)
+    states = trajectory.states
+    return jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+
+
+def _join(
+    errors: list[PushErrors], parts: list[tuple[np.ndarray, int]]
+) -> PushErrors:
+    """Put the errors of all parts back into the order of the store."""
+    order = np.argsort(np.concatenate([part for part, _ in parts]))
+    stacked = {
+        name: np.concatenate([vars(e)[name] for e in errors])[order]
+        for name in vars(errors[0])
+    }
+    return PushErrors(**stacked)
+
+
+def _evaluation(
+    store: Store,
+    arrays: dict[str, np.ndarray],
+    errors: dict[str, PushErrors],
+    parts: list[tuple[np.ndarray, int]],
+) -> Evaluation:
+    order = np.argsort(np.concatenate([part for part, _ in parts]))
+    ends = [final_pose(*_truth(arrays, part, steps)) for part, steps in parts]
+    final = np.concatenate(ends)[order]
+    recorded = store.info.engine == "recorded"
+    names = store.info.groups
+    return Evaluation(
+        errors=errors,
+        published={
+            name: final_errors(arrays[published_name(name)].astype(np.float64), final)
+            for name in store.info.published
+        },
+        travel_mm=travel_mm(arrays["initial"][..., :3].astype(np.float64), final),
+        groups=tuple(names[code] if names else None for code in arrays["group"]),
+        reference=REFERENCE_DISTANCE["recorded" if recorded else "simulated"],
+    )
+
+

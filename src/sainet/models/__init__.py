@@ -1,0 +1,1 @@
+"""Dynamics models: physics, the interaction network and its augmented form."""

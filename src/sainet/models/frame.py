@@ -1,0 +1,72 @@
+"""The push frame: where a network sees the scene from.
+
+Its x axis is the contact normal, from the pusher to the pushed disk, at the start of
+the push. What a network sees is turned into it and what it says is turned back, so
+that translation, rotation and permutation symmetry hold by construction.
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sainet.geometry import direction, rotate
+from sainet.pushes import Controls, ForceControls, PathControls
+from sainet.scene import Scene, State, pusher_gaps
+
+
+class PushFrame(eqx.Module):
+    """A frame on the table, and which disk is pushed in it."""
+
+    origin: Float[Array, "*batch 2"]  # m, centre of the pushed disk
+    angle: Float[Array, "*batch"]  # rad, of the contact normal
+    pushed: Float[Array, "*batch body"]  # 1 for the pushed disk, 0 for the others
+
+
+def push_frame(scene: Scene, state: State) -> PushFrame:
+    """Return the frame of the disk that is nearest to the pusher's surface."""
+    nearest = jnp.argmin(pusher_gaps(scene, state), axis=-1)
+    pushed = jax.nn.one_hot(nearest, scene.body_count, dtype=scene.mass.dtype)
+    origin = jnp.sum(pushed[..., None] * state.position, axis=-2)
+    return PushFrame(origin, direction(origin - state.pusher_position), pushed)
+
+
+def motion_to_frame(
+    motion: Float[Array, "*batch body 6"], frame: PushFrame
+) -> Float[Array, "*batch body 6"]:
+    """Turn packed motion from the table's frame into the push frame."""
+    place = motion[..., 0:2] - frame.origin[..., None, :]
+    return _turn(motion, place, -frame.angle)
+
+
+def motion_from_frame(
+    motion: Float[Array, "*batch body 6"], frame: PushFrame
+) -> Float[Array, "*batch body 6"]:
+    """Undo `motion_to_frame`."""
+    back = _turn(motion, motion[..., 0:2], frame.angle)
+    place = back[..., 0:2] + frame.origin[..., None, :]
+    return jnp.concatenate([place, back[..., 2:]], axis=-1)
+
+
+def _turn(motion: Array, place: Array, angle: Array) -> Array:
+    parts = [
+        rotate(place, angle[..., None]),
+        motion[..., 2:3] + angle[..., None, None],
+        rotate(motion[..., 3:5], angle[..., None]),
+        motion[..., 5:6],
+    ]
+    return jnp.concatenate(parts, axis=-1)
+
+
+def controls_to_frame(controls: Controls, frame: PushFrame) -> Controls:
+    """Turn controls from the table's frame into the push frame."""
+    angle = -frame.angle[..., None]
+    if isinstance(controls, PathControls):
+        place = controls.position - frame.origin[..., None, :]
+        return PathControls(rotate(place, angle), rotate(controls.velocity, angle))
+    return ForceControls(
+        force=rotate(controls.force, angle),
+        contact_offset=rotate(controls.contact_offset, -frame.angle),
+        pusher_mass=controls.pusher_mass,
+        damping=controls.damping,
+    )

@@ -1,0 +1,176 @@
+"""The interaction network: effects between pairs, then the acceleration of each body.
+
+One class is both IN and SAIN; they differ in whether the features hold the simulator's
+prediction (eq. 4 to 7 and 8 to 12 of the paper).
+"""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import lax
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from sainet.models.features import (
+    Drive,
+    FeatureSizes,
+    Still,
+    body_features,
+    pair_features,
+)
+
+WIDTHS = (128, 64, 32, 16)
+EFFECT = WIDTHS[-1]
+FEATURE_BOUND = 4.0  # standard deviations
+_CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
+
+
+class Layers(eqx.Module):
+    """Linear layers with ReLU after all but the last."""
+
+    weights: tuple[Float[Array, "input output"], ...]
+    biases: tuple[Float[Array, " output"], ...]
+
+    def __init__(self, widths: tuple[int, ...], *, key: PRNGKeyArray) -> None:
+        """Draw weights uniformly within one over the root of the inputs."""
+        keys = jax.random.split(key, (len(widths) - 1, 2))
+        weights, biases = [], []
+        for (inputs, outputs), (weight_key, bias_key) in zip(
+            zip(widths[:-1], widths[1:], strict=True), keys, strict=True
+        ):
+            reach = inputs**-0.5
+            draw = jax.random.uniform
+            shape = (inputs, outputs)
+            weights.append(draw(weight_key, shape, minval=-reach, maxval=reach))
+            biases.append(draw(bias_key, (outputs,), minval=-reach, maxval=reach))
+        self.weights, self.biases = tuple(weights), tuple(biases)
+
+    def __call__(self, x: Float[Array, "*row input"]) -> Float[Array, "*row output"]:
+        """Apply the layers to each row."""
+        last = len(self.weights) - 1
+        for index, (weight, bias) in enumerate(
+            zip(self.weights, self.biases, strict=True)
+        ):
+            x = x @ weight
+            x = x + jnp.broadcast_to(bias, x.shape)
+            x = x if index == last else jax.nn.relu(x)
+        return x
+
+
+class Scales(eqx.Module):
+    """Statistics of the training data; kept with the network, never trained."""
+
+    pair_mean: Float[Array, " pair"]
+    pair_deviation: Float[Array, " pair"]
+    body_mean: Float[Array, " body"]
+    body_deviation: Float[Array, " body"]
+    acceleration: Float[Array, " 3"]  # m/s^2, m/s^2, rad/s^2
+
+
+class InteractionNetwork(eqx.Module):
+    """Predicts the next motion of any number of bodies."""
+
+    rel: Layers  # f_rel
+    dyn: Layers  # f_dyn, which ends in a linear read-out of the accelerations
+    scales: Scales
+    sizes: FeatureSizes
+    time_step: float = eqx.field(static=True)  # s
+
+    def __init__(
+        self,
+        sizes: FeatureSizes,
+        *,
+        time_step: float,
+        key: PRNGKeyArray,
+        scales: Scales | None = None,
+    ) -> None:
+        """Make an untrained network.
+
+        Args:
+            sizes: of its inputs.
+            time_step: s, of the data it is for.
+            key: draws the weights.
+            scales: of its inputs and outputs; None is 1.
+        """
+        rel_key, dyn_key = jax.random.split(key)
+        self.rel = Layers((sizes.pair, *WIDTHS), key=rel_key)
+        self.dyn = Layers((sizes.body + EFFECT, *WIDTHS, 3), key=dyn_key)
+        self.scales = scales or unit_scales(sizes)
+        self.sizes = sizes
+        self.time_step = time_step
+
+    def acceleration(
+        self, motion: Float[Array, "body 6"], still: Still, drive: Drive
+    ) -> Float[Array, "body 3"]:
+        """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 6 and 10)."""
+        effect = self._effects(motion, still, drive)
+        features = body_features(motion, still, drive)
+        shown = _standardise(features, self.scales.body_mean, self.scales.body_deviation)
+        out = self.dyn(jnp.concatenate([shown, effect], axis=-1))
+        return out * jnp.broadcast_to(self.scales.acceleration, out.shape)
+
+    def _effects(
+        self, motion: Float[Array, "body 6"], still: Still, drive: Drive
+    ) -> Float[Array, "body effect"]:
+        """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j)."""
+        if motion.shape[0] == 1:
+            return jnp.zeros((1, EFFECT), motion.dtype)
+        features = pair_features(motion, still, drive)
+        shown = _standardise(features, self.scales.pair_mean, self.scales.pair_deviation)
+        return jnp.sum(self.rel(shown), axis=0)
+
+    def step(
+        self, motion: Float[Array, "body 6"], still: Still, drive: Drive
+    ) -> Float[Array, "body 6"]:
+        """Return the next packed motion: v' = v + dt f_dyn, p' = p + dt v'."""
+        rate = motion[:, 3:6] + self.time_step * self.acceleration(motion, still, drive)
+        pose = motion[:, 0:3] + self.time_step * rate
+        return jnp.concatenate([pose, rate], axis=-1)
+
+
+def _standardise(x: Array, mean: Array, deviation: Array) -> Array:
+    """Bring features to unit size and bound them smoothly.
+
+    Contacts kick: without the bound, 200 steps of back-propagation explode.
+    """
+    shape = x.shape
+    scaled = (x - jnp.broadcast_to(mean, shape)) / jnp.broadcast_to(deviation, shape)
+    return FEATURE_BOUND * jnp.tanh(scaled / FEATURE_BOUND)
+
+
+def unit_scales(sizes: FeatureSizes) -> Scales:
+    """Return scales that change nothing."""
+    return Scales(
+        pair_mean=jnp.zeros(sizes.pair),
+        pair_deviation=jnp.ones(sizes.pair),
+        body_mean=jnp.zeros(sizes.body),
+        body_deviation=jnp.ones(sizes.body),
+        acceleration=jnp.ones(3),
+    )
+
+
+def unroll(
+    network: InteractionNetwork,
+    initial: Float[Array, "push body 6"],
+    still: Still,
+    drive: Drive,
+) -> Float[Array, "time push body 6"]:
+    """Predict recurrently from each initial motion, all in the push frame (eq. 2).
+
+    Args:
+        network: to be applied at every step.
+        initial: packed motion at the start.
+        still: for each push.
+        drive: with axes ``[push, time, ...]``.
+
+    Returns:
+        The packed motion after each step, time first.
+    """
+    step = jax.vmap(network.step)
+
+    @jax.checkpoint
+    def body(motion: Array, now: Drive) -> tuple[Array, Array]:
+        motion = step(motion, still, now)
+        return motion, motion
+
+    time_first = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
+    return lax.scan(body, initial, time_first, unroll=_CHECKPOINTED_STEPS)[1]

@@ -1,0 +1,1 @@
+"""Fitting a network to stored pushes: loss, statistics, optimiser and the loop."""

@@ -1,0 +1,66 @@
+"""Settings of training, free of JAX."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from sainet.errors import BadInput
+
+ModelKind = Literal["in", "sain"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FitConfig:
+    """The paper's recipe (section IV-C)."""
+
+    iterations: int = 10_000
+    """Number of gradient steps."""
+    batch_size: int = 100
+    """Pushes in a gradient step."""
+    learning_rate: float = 1e-3
+    """Of Adam at the start."""
+    halve_every: int = 2_500
+    """Iterations after which the learning rate is halved."""
+    l2: float = 1e-6
+    """Weight of the squared weights in the loss (the paper's 1e-3 is for a loss in
+    metres, not for the standardised one)."""
+    steps: int = 200
+    """Steps of a push that are trained on; pushes of 600 steps, say, need 600."""
+    seed: int = 0
+    """Of the first weights and of the order of the pushes."""
+    weight_position: float = 1.0
+    """Weight of the position in the loss, once it is standardised."""
+    weight_rotation: float = 1.0
+    """Weight of the sine and cosine of the rotation."""
+    weight_velocity: float = 1.0
+    """Weight of the velocity."""
+    weight_spin: float = 1.0
+    """Weight of the spin."""
+    clip_norm: float = 1.0
+    """Greatest norm of a gradient; longer ones are shortened to it."""
+    validation_pushes: int = 0
+    """Pushes at the end of the dataset that are kept for validation."""
+    log_every: int = 50
+    """Iterations between two lines of the log."""
+    checkpoint_every: int = 250
+    """Iterations between two checkpoints to resume from."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that no training can have."""
+        for name in ("iterations", "batch_size", "halve_every", "steps"):
+            _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
+        for name in ("log_every", "checkpoint_every"):
+            _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
+        for name in ("learning_rate", "clip_norm"):
+            value = getattr(self, name)
+            _require(math.isfinite(value) and value > 0, name, "positive", value)
+        weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
+        for name in ("l2", *weights, "validation_pushes", "seed"):
+            value = getattr(self, name)
+            _require(math.isfinite(value) and value >= 0, name, "0 or more", value)
+
+
+def _require(condition: bool, name: str, wanted: str, value: object) -> None:
+    if not condition:
+        option = "--" + name.replace("_", "-")
+        raise BadInput(f"{option} is {value}; it must be {wanted}.")

@@ -1,0 +1,82 @@
+"""Scales of features, outputs and loss terms, from the training data."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from sainet.datasets.batch import PushBatch
+from sainet.models.features import (
+    FeatureSizes,
+    body_features,
+    drives,
+    pair_features,
+    still_features,
+)
+from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
+from sainet.models.interaction import Scales
+from sainet.scene import pack_motion
+from sainet.training.batch import path_to_frame
+from sainet.training.config import FitConfig
+from sainet.training.loss import LossWeights
+
+
+@eqx.filter_jit
+def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
+    """Return means and deviations of what a network sees along the true paths."""
+    frame = push_frame(batch.scene, batch.initial)
+    motion = path_to_frame(_known_motion(batch), frame)
+    start = motion_to_frame(pack_motion(batch.initial), frame)
+    before = jnp.concatenate([start[None], motion[:-1]])
+    simulated = None
+    if sizes.augmented and batch.simulated is not None:
+        simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
+    drive = drives(controls_to_frame(batch.controls, frame), start, simulated)
+    drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
+    still = still_features(batch.scene, frame.pushed)
+    over_time = jax.vmap(jax.vmap(body_features), in_axes=(0, None, 0))
+    body_mean, body_deviation = _spread(over_time(before, still, drive))
+    if batch.scene.body_count > 1:
+        over_pairs = jax.vmap(jax.vmap(pair_features), in_axes=(0, None, 0))
+        pair_mean, pair_deviation = _spread(over_pairs(before, still, drive))
+    else:
+        pair_mean, pair_deviation = jnp.zeros(sizes.pair), jnp.ones(sizes.pair)
+    change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
+    size = jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
+    return Scales(
+        pair_mean=pair_mean,
+        pair_deviation=pair_deviation,
+        body_mean=body_mean,
+        body_deviation=body_deviation,
+        # x and y share a scale: a turned frame must not change it.
+        acceleration=jnp.array([size[:2].mean(), size[:2].mean(), size[2]]),
+    )
+
+
+def _spread(features: Array) -> tuple[Array, Array]:
+    rows = features.reshape(-1, features.shape[-1])
+    deviation = jnp.std(rows, axis=0)
+    # A feature that never varies, a fixed mass say, must not be divided by zero.
+    return jnp.mean(rows, axis=0), jnp.where(deviation > 1e-9, deviation, 1.0)
+
+
+@eqx.filter_jit
+def loss_weights(batch: PushBatch, config: FitConfig) -> LossWeights:
+    """Return the settings over the mean squares of the motion in the data."""
+    motion = _known_motion(batch)
+    moved = motion[..., 0:3] - pack_motion(batch.initial)[:, None, :, 0:3]
+    place = jnp.mean(jnp.sum(moved[..., 0:2] ** 2, axis=-1))
+    velocity = jnp.mean(jnp.sum(motion[..., 3:5] ** 2, axis=-1))
+    return LossWeights(
+        position=config.weight_position / place,
+        rotation=config.weight_rotation / jnp.mean(moved[..., 2] ** 2),
+        velocity=config.weight_velocity / velocity,
+        spin=config.weight_spin / jnp.mean(motion[..., 5] ** 2),
+    )
+
+
+def _known_motion(batch: PushBatch) -> Array:
+    """Return the true motion, or the simulated one where the truth is not known."""
+    if batch.simulated is None:
+        return jnp.nan_to_num(batch.truth)
+    return jnp.where(jnp.isnan(batch.truth), batch.simulated, batch.truth)

@@ -1,0 +1,124 @@
+"""One gradient step, compiled once: the batch is split over all devices."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optax
+from jax.sharding import PartitionSpec
+from jaxtyping import Array
+
+from sainet.datasets.batch import PushBatch
+from sainet.devices import BATCH, batch_mesh
+from sainet.models.interaction import InteractionNetwork, Layers
+from sainet.training.batch import predict_batch, to_target
+from sainet.training.config import FitConfig
+from sainet.training.loss import LossWeights, push_losses
+
+_MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
+
+Trained = tuple[Layers, Layers]
+
+
+class FitState(eqx.Module):
+    """All that changes while training: enough to go on from, bit for bit."""
+
+    network: InteractionNetwork
+    optimizer: Any
+    iteration: Array
+
+
+def make_optimizer(config: FitConfig) -> optax.GradientTransformation:
+    """Return Adam with the paper's schedule, guarded against steps that explode."""
+    schedule = optax.exponential_decay(
+        config.learning_rate, config.halve_every, 0.5, staircase=True
+    )
+    chain = optax.chain(optax.clip_by_global_norm(config.clip_norm), optax.adam(schedule))
+    return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
+
+
+def trained_layers(network: InteractionNetwork) -> Trained:
+    """Return the part of a network that is trained: all but its scales."""
+    return network.rel, network.dyn
+
+
+def with_layers(network: InteractionNetwork, layers: Trained) -> InteractionNetwork:
+    """Return the network with other weights."""
+    return eqx.tree_at(trained_layers, network, layers)
+
+
+def first_state(network: InteractionNetwork, config: FitConfig) -> FitState:
+    """Return the state before the first iteration."""
+    optimizer = make_optimizer(config).init(trained_layers(network))
+    return FitState(network, optimizer, jnp.zeros((), jnp.int32))
+
+
+def data_loss(
+    network: InteractionNetwork, batch: PushBatch, weights: LossWeights
+) -> Array:
+    """Return the sum of the losses of the pushes of a batch."""
+    predicted = predict_batch(network, batch)
+    return jnp.sum(push_losses(predicted, to_target(batch), weights))
+
+
+def make_gradient(
+    weights: LossWeights,
+) -> Callable[[InteractionNetwork, PushBatch], tuple[Array, Trained]]:
+    """Return a function that sums loss and gradient over a batch on all devices."""
+
+    def local(network: InteractionNetwork, batch: PushBatch) -> tuple[Array, Trained]:
+        def loss(layers: Trained) -> Array:
+            return data_loss(with_layers(network, layers), batch, weights)
+
+        return jax.lax.psum(jax.value_and_grad(loss)(trained_layers(network)), BATCH)
+
+    return jax.shard_map(
+        local,
+        mesh=batch_mesh(),
+        in_specs=(PartitionSpec(), PartitionSpec(BATCH)),
+        out_specs=PartitionSpec(),
+        check_vma=False,
+    )
+
+
+def make_step(
+    config: FitConfig, weights: LossWeights
+) -> Callable[[FitState, PushBatch], tuple[FitState, Array]]:
+    """Return the compiled gradient step.
+
+    It takes the state and a batch whose size the devices divide (see `even_batch`),
+    and returns the next state and the mean loss of the pushes, l2 left out.
+    """
+    optimizer, gradient = make_optimizer(config), make_gradient(weights)
+
+    @jax.jit
+    def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
+        total, summed = gradient(state.network, batch)
+        layers = trained_layers(state.network)
+        mean = jax.tree.map(
+            lambda g, w: g / config.batch_size + 2 * config.l2 * w, summed, layers
+        )
+        updates, moments = optimizer.update(mean, state.optimizer, layers)
+        network = with_layers(state.network, optax.apply_updates(layers, updates))  # pyright: ignore
+        return FitState(network, moments, state.iteration + 1), total / config.batch_size
+
+    return step
+
+
+def even_batch(batch: PushBatch) -> PushBatch:
+    """Repeat the last push, unobserved, until the devices divide the batch."""
+    extra = -batch.size % jax.device_count()
+    if not extra:
+        return batch
+    padded = jax.tree.map(
+        lambda x: jnp.concatenate([x, jnp.repeat(x[-1:], extra, axis=0)]), batch
+    )
+    real = jnp.arange(batch.size + extra) < batch.size
+    return eqx.tree_at(
+        lambda b: (b.pose_observed, b.rate_observed),
+        padded,
+        (padded.pose_observed & real[:, None], padded.rate_observed & real[:, None]),
+    )
+
