@@ -102,7 +102,7 @@ def bounds(values: Range) -> tuple[float, float]:
 def _check_range(name: str, values: Range, *, positive: bool) -> None:
     wanted = "positive, low before high" if positive else "0 or more, low before high"
     good = len(values) in (1, 2) and all(map(_finite, values))
-    good = good and (0 < values[0] if positive else 0 <= values[0])
+    good = good and (values[0] > 0 if positive else values[0] >= 0)
     _require(good and values[0] <= values[-1], name, wanted, values)
 
 

@@ -29,8 +29,10 @@ NO_DISKS = (
 )
 CONTACT_FRICTION = 0.25
 CONTACT_FRICTION_ORIGIN = (
-    "default: chosen by a sweep from 0.15 to 0.35 with the planar engine on these same "
-    "pushes, and the value (mu) in the published evaluation logs"
+    "default: mu in a published evaluation log of this robot (plywood, rect1), and the "
+    "choice of an earlier sweep on these same pushes, so that it is no blind guess; "
+    "swept from 0.15 to 0.35, the planar engine's positions are best from 0.15 to 0.2 "
+    "and its rotations on abs at 0.35"
 )
 TABLE_FRICTION = 0.15  # the paper's; a quasi-static path hardly depends on it
 
@@ -52,8 +54,9 @@ def import_endpoints(
         path: `ellip1_endpoints.csv`, a folder that holds it, or a log as its authors
             published it (`plywood_ellip1_poly4_v10.mat`).
         out: the run folder; it appears when the store is whole and not before.
-        contact_friction: between pusher and disk. The default comes from a sweep over
-            0.15 to 0.35 on these same pushes: it is fitted, if with one number alone.
+        contact_friction: between pusher and disk. The default is `mu` in a published
+            evaluation log, and what an earlier sweep on these same pushes chose: it is
+            no blind guess (`CONTACT_FRICTION_ORIGIN`, kept in `config.json`).
         table_friction: between disk and table, of one value for all surfaces.
 
     Raises:

@@ -104,7 +104,7 @@ def _steps(
     # A hair less than exact: 48.0000001 steps of motion are 48.
     moving = np.ceil(np.asarray(stroke) / speed / TIME_STEP - 1e-6)
     whole = moving + config.hold_steps
-    return (np.ceil(whole / _LENGTH_BUCKET) * _LENGTH_BUCKET).astype(int)
+    return np.asarray(np.ceil(whole / _LENGTH_BUCKET) * _LENGTH_BUCKET, int)
 
 
 def _commands(

@@ -1,14 +1,15 @@
 """Reading a store: checked when it is opened, then read in parts."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from sainet.datasets.schema import FORMAT_VERSION, StoreInfo, sizes, variables
-from sainet.datasets.writer import ARRAYS, HASHES
+from sainet.datasets.schema import FORMAT_VERSION, Kind, StoreInfo, sizes, variables
+from sainet.datasets.writer import ARRAYS, HASHES, chunk_files
 from sainet.errors import BadStore
 from sainet.runs import content_hash, read_json
 
@@ -74,6 +75,7 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
     if not isinstance(hashes, dict) or "zarr.json" not in hashes:
         raise BadStore(f"{folder / HASHES}: files is missing; make the dataset again.")
     info = _read_info(folder)
+    _check_listing(folder / HASHES, hashes, info)
     _check_files(folder, hashes, verify=verify)
     store = Store(folder, info)
     _check_shapes(store)
@@ -95,6 +97,33 @@ def _check_version(path: Path, found: dict[str, Any]) -> None:
     )
 
 
+def _check_listing(path: Path, hashes: dict[str, Any], info: StoreInfo) -> None:
+    for index in range(info.chunks):
+        for name in chunk_files(info, index):
+            if not isinstance(hashes.get(name), str):
+                raise BadStore(f"{path}: {name} has no hash; make the dataset again.")
+
+
+def _is_count(value: object) -> bool:
+    return type(value) is int and value > 0
+
+
+def _is_positive(value: object) -> bool:
+    return isinstance(value, int | float) and 0 < value < float("inf")
+
+
+def _are_names(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
+_SENSE: dict[str, Callable[[object], bool]] = {
+    "kind": lambda value: value in get_args(Kind),
+    **dict.fromkeys(("pushes", "bodies", "steps", "chunk_size"), _is_count),
+    **dict.fromkeys(("time_step", "pusher_mass", "damping"), _is_positive),
+    **dict.fromkeys(("assumed_engines", "groups", "published"), _are_names),
+}
+
+
 def _read_info(folder: Path) -> StoreInfo:
     path = folder / ARRAYS / "zarr.json"
     attributes = read_json(path, BadStore).get("attributes", {})
@@ -104,11 +133,14 @@ def _read_info(folder: Path) -> StoreInfo:
     if missing:
         raise BadStore(f"{path}: {missing[0]} is missing; make the dataset again.")
     known = {name: attributes[name] for name in names}
+    for name, makes_sense in _SENSE.items():
+        if not makes_sense(known[name]):
+            raise BadStore(f"{path}: {name} is {known[name]!r}; make it again.")
     lists = {k: tuple(v) for k, v in known.items() if isinstance(v, list)}
     return StoreInfo(**(known | lists))
 
 
-def _check_files(folder: Path, hashes: dict[str, str], *, verify: bool) -> None:
+def _check_files(folder: Path, hashes: dict[str, Any], *, verify: bool) -> None:
     for name, known in hashes.items():
         path = folder / ARRAYS / name
         try:

@@ -28,12 +28,11 @@ def push_errors(
     position = 1000 * np.linalg.norm(offset[..., :2], axis=-1)
     # An angle error is never more than half a turn.
     rotation = np.abs(np.rad2deg(_wrap(offset[..., 2])))
-    last = observed.shape[1] - 1 - np.argmax(observed[:, ::-1], axis=1)
     return PushErrors(
         pos_mm=_mean_over_time(position, observed),
         rot_deg=_mean_over_time(rotation, observed),
-        final_pos_mm=_at(position, last),
-        final_rot_deg=_at(rotation, last),
+        final_pos_mm=_last(position, observed),
+        final_rot_deg=_last(rotation, observed),
     )
 
 
@@ -57,19 +56,21 @@ def travel_mm(
 def final_pose(
     pose: Float[np.ndarray, "push time body 3"], observed: Bool[np.ndarray, "push time"]
 ) -> Float[np.ndarray, "push body 3"]:
-    """Return the last observed pose of each push."""
-    last = observed.shape[1] - 1 - np.argmax(observed[:, ::-1], axis=1)
-    return _at(pose, last)
+    """Return the last observed pose of each push; NaN if none was observed."""
+    return _last(pose, observed)
 
 
 def _mean_over_time(error: np.ndarray, observed: np.ndarray) -> np.ndarray:
-    count = observed.sum(axis=1)
+    count = observed.sum(axis=1).astype(float)
     summed = np.where(observed[..., None], error, 0.0).sum(axis=1)
-    return summed / count[:, None]
+    return summed / np.where(count, count, np.nan)[:, None]
 
 
-def _at(values: np.ndarray, step: np.ndarray) -> np.ndarray:
-    return values[np.arange(len(values)), step]
+def _last(values: np.ndarray, observed: np.ndarray) -> np.ndarray:
+    """Return what belongs to the last observed step of each push, else NaN."""
+    last = observed.shape[1] - 1 - np.argmax(observed[:, ::-1], axis=1)
+    seen = observed.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
+    return np.where(seen, values[np.arange(len(values)), last], np.nan)
 
 
 def _wrap(angle: np.ndarray) -> np.ndarray:

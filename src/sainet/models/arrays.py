@@ -16,8 +16,9 @@ def save_arrays(path: Path, tree: Any) -> bytes:  # noqa: ANN401
     from safetensors.numpy import save
 
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
+    # Not ascontiguousarray: it makes a scalar an array of one.
     named = {
-        jax.tree_util.keystr(where): np.ascontiguousarray(leaf)
+        jax.tree_util.keystr(where): np.asarray(leaf, order="C")
         for where, leaf in leaves
     }
     data = save(named)
@@ -60,6 +61,8 @@ def _take(path: Path, found: dict[str, np.ndarray], where: Any, like: Any) -> An
             f"{path}: {name} is {array.dtype}{list(array.shape)}, not "
             f"{wanted.dtype}{list(wanted.shape)}; it belongs to another network."
         )
-    if np.issubdtype(array.dtype, np.floating) and np.isnan(array).any():
-        raise BadCheckpoint(f"{path}: {name} holds NaN; train the network again.")
+    if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
+        raise BadCheckpoint(
+            f"{path}: {name} holds NaN or infinity; train the network again."
+        )
     return jnp.asarray(array)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from sainet.errors import BadCheckpoint
+from sainet.models.card_check import check_card
 from sainet.runs import FORMAT_VERSION, read_json
 
 CARD = "card.json"
@@ -60,4 +61,5 @@ def read_card(folder: Path) -> Card:
     missing = sorted(names - found.keys())
     if missing:
         raise BadCheckpoint(f"{path}: {missing[0]} is missing; train it again.")
+    check_card(path, found)
     return Card(**{name: found[name] for name in names})

@@ -20,6 +20,8 @@ from sainet.training.batch import path_to_frame
 from sainet.training.config import FitConfig
 from sainet.training.loss import LossWeights
 
+_STILL = 1e-14  # a mean square (m^2, say) below this is rounding
+
 
 @eqx.filter_jit
 def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
@@ -68,11 +70,16 @@ def loss_weights(batch: PushBatch, config: FitConfig) -> LossWeights:
     place = jnp.mean(jnp.sum(moved[..., 0:2] ** 2, axis=-1))
     velocity = jnp.mean(jnp.sum(motion[..., 3:5] ** 2, axis=-1))
     return LossWeights(
-        position=config.weight_position / place,
-        rotation=config.weight_rotation / jnp.mean(moved[..., 2] ** 2),
-        velocity=config.weight_velocity / velocity,
-        spin=config.weight_spin / jnp.mean(motion[..., 5] ** 2),
+        position=config.weight_position / _nonzero(place),
+        rotation=config.weight_rotation / _nonzero(jnp.mean(moved[..., 2] ** 2)),
+        velocity=config.weight_velocity / _nonzero(velocity),
+        spin=config.weight_spin / _nonzero(jnp.mean(motion[..., 5] ** 2)),
     )
+
+
+def _nonzero(square: Array) -> Array:
+    """Return a mean square, or 1 where nothing moves: a disk that never turns, say."""
+    return jnp.where(square > _STILL, square, 1.0)
 
 
 def _known_motion(batch: PushBatch) -> Array:

@@ -1,0 +1,116 @@
+"""The same training iteration in PyTorch, in an environment and a process of its own.
+
+PyTorch is no dependency of the package: the comparison lives in `benchmarks/`, beside
+the sources, and `make torch-env` makes its environment.
+"""
+
+import json
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sainet.bench.problem import Problem
+from sainet.errors import SainetError
+from sainet.models.features import drives, still_features
+from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
+from sainet.models.interaction import FEATURE_BOUND
+from sainet.scene import pack_motion
+from sainet.training.batch import path_to_frame, to_target
+
+FOLDER = Path(__file__).resolve().parents[3] / "benchmarks"
+_SCRIPT = FOLDER / "torch_training.py"
+_PYTHON = FOLDER / ".venv" / "bin" / "python"
+_TOLERANCE = 1e-3  # of the first loss, relative: single precision over 200 steps
+
+
+def missing_torch() -> str | None:
+    """Return why there is nothing to compare with, None if there is."""
+    if not _SCRIPT.is_file():
+        return "benchmarks/ is not in the installed package; run from a checkout"
+    if not any(FOLDER.glob(".venv/lib/python*/site-packages/torch/__init__.py")):
+        return "no PyTorch in benchmarks/.venv; run `make torch-env`"
+    return None
+
+
+class TorchPeer:
+    """Trains on a saved problem with PyTorch, as long as it does the same work."""
+
+    def __init__(self, problem: Path, loss: float) -> None:
+        """Remember the file of `save_problem` and the loss before the first step."""
+        self._problem = problem
+        self._loss = loss
+
+    def iteration_ms(self, iterations: int = 5) -> float:
+        """Return the median time of some iterations, after one that warms up (ms).
+
+        Raises:
+            SainetError: its first loss is not ours.
+        """
+        result = run_torch(self._problem, iterations)
+        difference = abs(result["loss"] - self._loss)
+        if not difference <= _TOLERANCE * abs(self._loss):
+            raise SainetError(
+                f"{_SCRIPT.name}: the first loss is {result['loss']:.6g} and ours "
+                f"{self._loss:.6g}; the comparison must do the same work, mend it."
+            )
+        return result["iteration_ms"]
+
+
+def run_torch(problem: Path, iterations: int = 5) -> dict[str, Any]:
+    """Return what `benchmarks/torch_training.py` prints about a saved problem.
+
+    Raises:
+        SainetError: it failed.
+    """
+    command = [str(_PYTHON), str(_SCRIPT), str(problem), str(iterations)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+        raise SainetError(f"{_SCRIPT.name} failed ({last}); try `make torch-env`.")
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def save_problem(path: Path, problem: Problem) -> Path:
+    """Write a problem as plain arrays, everything in the push frame; return the path.
+
+    Weights are saved as they are, with axes ``[input, output]``.
+    """
+    network, weights = problem.state.network, problem.weights
+    arrays = _batch_arrays(problem)
+    for name, layers in (("rel", network.rel), ("dyn", network.dyn)):
+        for index, weight in enumerate(layers.weights):
+            arrays[f"{name}_weight_{index}"] = weight
+            arrays[f"{name}_bias_{index}"] = layers.biases[index]
+    for group, tree in (("scales", network.scales), ("loss", weights)):
+        arrays |= {f"{group}_{name}": value for name, value in vars(tree).items()}
+    settings = {
+        "feature_bound": FEATURE_BOUND,
+        "time_step": network.time_step,
+        "learning_rate": problem.config.learning_rate,
+        "clip_norm": problem.config.clip_norm,
+        "l2": problem.config.l2,
+    }
+    np.savez(path, **{k: np.asarray(v) for k, v in (arrays | settings).items()})
+    return path
+
+
+def _batch_arrays(problem: Problem) -> dict[str, Any]:
+    size, whole = problem.config.batch_size, problem.batch
+    if whole.simulated is None:
+        raise ValueError("a batch for SAIN holds s-bar")
+    frame = push_frame(whole.scene, whole.initial)
+    initial = motion_to_frame(pack_motion(whole.initial), frame)
+    simulated = path_to_frame(whole.simulated, frame).swapaxes(0, 1)
+    drive = drives(controls_to_frame(whole.controls, frame), initial, simulated)
+    target = to_target(whole)
+    arrays = {
+        "initial": initial,
+        **drive._asdict(),
+        **still_features(whole.scene, frame.pushed)._asdict(),
+        "pose": target.pose.swapaxes(0, 1),
+        "rate": target.rate.swapaxes(0, 1),
+    }
+    # Not the pushes that were repeated to make the batch even.
+    return {name: value[:size] for name, value in arrays.items()}

@@ -1,0 +1,47 @@
+"""The training problem that is timed: SAIN on simulated pushes, as `fit` trains it."""
+
+from typing import NamedTuple
+
+import jax
+
+from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.simulate import simulate_chunk, store_info
+from sainet.models.features import FeatureSizes
+from sainet.models.interaction import InteractionNetwork
+from sainet.training.config import FitConfig
+from sainet.training.loss import LossWeights
+from sainet.training.statistics import feature_scales, loss_weights
+from sainet.training.step import FitState, even_batch, first_state
+
+
+class Problem(NamedTuple):
+    """All that a gradient step needs."""
+
+    config: FitConfig
+    state: FitState
+    weights: LossWeights
+    batch: PushBatch
+
+
+def make_problem(pushes: int = 100, steps: int = 200) -> Problem:
+    """Simulate a batch and make an untrained SAIN for it.
+
+    Args:
+        pushes: in the batch: robot setup, two disks, distributions of the paper.
+        steps: to keep of each push, at most 200.
+    """
+    data = GenerateConfig(pushes=pushes, chunk_size=pushes)
+    info = store_info(data)
+    arrays = simulate_chunk(data, 0)
+    batch = to_batch(arrays, info, steps=steps, simulated=data.assumed_engine)
+    config = FitConfig(batch_size=pushes, steps=steps)
+    sizes = FeatureSizes(info.kind, augmented=True)
+    network = InteractionNetwork(
+        sizes,
+        time_step=info.time_step,
+        key=jax.random.key(config.seed),
+        scales=feature_scales(batch, sizes),
+    )
+    weights = loss_weights(batch, config)
+    return Problem(config, first_state(network, config), weights, even_batch(batch))

@@ -1,0 +1,130 @@
+"""How close one training iteration of the paper's batch comes to the machine's ceiling.
+
+The ceiling, our iteration and PyTorch's are measured side by side, several times over;
+every figure is the median of those measurements.
+"""
+
+import logging
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
+
+import jax
+from jax.sharding import NamedSharding, PartitionSpec
+
+from sainet.bench.ceiling import ceiling_gflops
+from sainet.bench.peer import TorchPeer, missing_torch, save_problem
+from sainet.bench.problem import Problem, make_problem
+from sainet.bench.timing import check_runs, median_seconds
+from sainet.devices import batch_mesh
+from sainet.models.interaction import InteractionNetwork
+from sainet.training.step import make_step
+
+_FORWARD_AND_BACK = 3  # a product's two gradients are two products of its size
+_log = logging.getLogger(__name__)
+
+
+class Measurement(NamedTuple):
+    """What was measured side by side."""
+
+    ceiling_gflops: float
+    iteration_ms: float
+    torch_ms: float | None
+
+
+class TrainingLoop:
+    """Iterates on one batch, each time from where the last iteration ended."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Compile and make the first iteration; `first_loss` is before it."""
+        self._step = make_step(problem.config, problem.weights)
+        self._batch = problem.batch
+        # Where the step leaves its result; elsewhere, the second call compiles anew.
+        everywhere = NamedSharding(batch_mesh(), PartitionSpec())
+        state = jax.device_put(problem.state, everywhere)
+        self._state, loss = self._step(state, problem.batch)
+        self.first_loss = float(loss)
+
+    def advance(self) -> Any:  # noqa: ANN401
+        """Make one iteration and return its arrays."""
+        self._state, loss = self._step(self._state, self._batch)
+        return self._state, loss
+
+
+def bench_training(
+    runs: int = 5, *, pushes: int = 100, steps: int = 200, repeats: int = 5
+) -> dict[str, Any]:
+    """Measure a training iteration of SAIN: gradient and Adam's update.
+
+    Args:
+        runs: measurements to take the median of.
+        pushes: in the batch, two disks each, robot setup.
+        steps: of each push, at most 200.
+        repeats: iterations in a measurement, of which it is the median.
+
+    Returns:
+        `iteration_ms`, `ceiling_fraction`, `eager_torch_ratio` and what they rest on.
+
+    Raises:
+        SainetError: PyTorch's first loss is not ours: it did other work.
+    """
+    check_runs(runs)
+    problem = make_problem(pushes, steps)
+    bodies = problem.batch.scene.body_count
+    work = counted_gflop(problem.state.network, pushes, steps, bodies)
+    loop = TrainingLoop(problem)
+    reason = missing_torch()
+    with TemporaryDirectory(prefix="sainet-bench-") as folder:
+        peer = None
+        if reason is None:
+            path = save_problem(Path(folder) / "problem.npz", problem)
+            peer = TorchPeer(path, loop.first_loss)
+        measured = [_measure(loop, peer, repeats) for _ in range(runs)]
+    return {
+        **_figures(measured, work),
+        "work_gflop": work,
+        "devices": jax.device_count(),
+        "runs": runs,
+        "reason": reason,
+    }
+
+
+def counted_gflop(
+    network: InteractionNetwork, pushes: int, steps: int, bodies: int
+) -> float:
+    """Return the work of an iteration's matrix products (1e9 operations).
+
+    A linear layer of K inputs and N outputs costs ``2 K N`` for each row and twice as
+    much on the way back; what is recomputed there is not counted. f_rel has a row for
+    each ordered pair of bodies, f_dyn one for each body.
+    """
+    pairs = bodies * (bodies - 1)
+    row = 2 * (pairs * _weights(network.rel) + bodies * _weights(network.dyn))
+    return _FORWARD_AND_BACK * row * pushes * steps / 1e9
+
+
+def _weights(layers: Any) -> int:  # noqa: ANN401
+    return sum(weight.size for weight in layers.weights)
+
+
+def _measure(loop: TrainingLoop, peer: TorchPeer | None, repeats: int) -> Measurement:
+    # In blocks, each with a warm-up of its own: NumPy's threads go on spinning for some
+    # milliseconds after a product and would slow an iteration right behind it.
+    ceiling = ceiling_gflops()
+    ours = 1000 * median_seconds(loop.advance, repeats)
+    theirs = None if peer is None else peer.iteration_ms(repeats)
+    measurement = Measurement(ceiling, ours, theirs)
+    _log.info("%s", measurement)
+    return measurement
+
+
+def _figures(measured: list[Measurement], work: float) -> dict[str, float | None]:
+    fractions = [work / (m.iteration_ms / 1000 * m.ceiling_gflops) for m in measured]
+    ratios = [m.torch_ms / m.iteration_ms for m in measured if m.torch_ms is not None]
+    return {
+        "iteration_ms": median(m.iteration_ms for m in measured),
+        "ceiling_gflops": median(m.ceiling_gflops for m in measured),
+        "ceiling_fraction": median(fractions),
+        "eager_torch_ratio": median(ratios) if ratios else None,
+    }

@@ -1,0 +1,40 @@
+"""`sainet demo`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sainet.cli.devices import use_devices, worker_pool
+from sainet.cli.output import Output
+from sainet.cli.progress import progress_bar
+from sainet.experiments.config import DemoConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demo:
+    """Show the whole method, small: simulate, train, compare, look."""
+
+    out: Path = Path("runs/demo")
+    """Run folder to write; ends with report.html."""
+    config: DemoConfig = field(default_factory=DemoConfig)
+    devices: int | None = None
+    """CPU devices to split a batch over; default: one a core."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Run the demo."""
+        use_devices(self.devices)
+        from sainet.experiments.demo import run_demo
+        from sainet.viz.tables import print_table
+
+        with worker_pool(None) as pool:
+            result = run_demo(
+                self.config,
+                self.out,
+                executor=pool,
+                say=self.output.say,
+                bar=lambda title, total: progress_bar(title, total, self.output),
+            )
+        print_table(result.table, self.output.console)
+        self.output.say(f"Open {result.report} in a browser: it plays.")
+        return {"report": str(result.report), **result.table}

@@ -1,0 +1,37 @@
+"""`sainet generate`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sainet.cli.devices import worker_pool
+from sainet.cli.output import Output
+from sainet.cli.progress import progress_bar
+from sainet.datasets.config import GenerateConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Generate:
+    """Simulate pushes with the paper's distributions and store them."""
+
+    config: GenerateConfig = field(default_factory=GenerateConfig)
+    out: Path
+    """Run folder to write; the same settings go on where they stopped."""
+    workers: int | None = None
+    """Processes; default: one a core. The result does not depend on it."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Generate the dataset."""
+        from sainet.datasets.generate import generate
+
+        bar = progress_bar("Simulating", self.config.pushes, self.output)
+        with worker_pool(self.workers) as pool, bar as advance:
+            store = generate(
+                self.config,
+                self.out,
+                executor=pool,
+                on_pushes=lambda pushes: advance(pushes, ""),
+            )
+        self.output.say(f"{store.info.pushes} pushes are in {self.out}")
+        return {"out": str(self.out), "pushes": store.info.pushes}

@@ -1,0 +1,38 @@
+"""What every command prints: text for people, or one JSON object at the end."""
+
+import json
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """Options that every command has."""
+
+    json: bool = False
+    """End with one JSON object on standard output; all else goes to standard error."""
+    quiet: bool = False
+    """Show no progress."""
+
+    @property
+    def console(self) -> "Console":
+        """Where text for people goes."""
+        from rich.console import Console
+
+        return Console(stderr=self.json, highlight=False)
+
+    def say(self, text: str) -> None:
+        """Say what is being done, unless quiet."""
+        if not self.quiet:
+            self.console.print(text)
+
+
+def finish(result: dict[str, Any], output: Output) -> None:
+    """Print the result of a command as JSON if that was asked for."""
+    if output.json:
+        print(json.dumps(result, allow_nan=False))
+        sys.stdout.flush()

@@ -1,0 +1,47 @@
+"""`sainet reproduce`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tyro.conf import Positional
+
+from sainet.cli.devices import use_devices, worker_pool
+from sainet.cli.output import Output
+from sainet.cli.progress import progress_bar
+from sainet.experiments.config import Scale
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce:
+    """Make tables again, each step once: finished ones are not run again."""
+
+    experiments: Positional[tuple[str, ...]] = ()
+    """robot-planar; default: all."""
+    scale: Scale = "quick"
+    """quick: minutes. paper: 4,500 pushes and 10,000 iterations."""
+    out: Path = Path("runs/reproduce")
+    """Folder to write, a folder in it for each experiment."""
+    devices: int | None = None
+    """CPU devices to split a batch over; default: one a core."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Run the experiments one after another."""
+        use_devices(self.devices)
+        from sainet.experiments import EXPERIMENTS, load_experiment
+        from sainet.viz.tables import print_table
+
+        tables: dict[str, Any] = {}
+        with worker_pool(None) as pool:
+            for name in self.experiments or tuple(EXPERIMENTS):
+                experiment = load_experiment(name)
+                tables[name] = experiment(
+                    self.scale,
+                    self.out / f"{name}-{self.scale}",
+                    executor=pool,
+                    say=self.output.say,
+                    bar=lambda title, total: progress_bar(title, total, self.output),
+                )
+                print_table(tables[name], self.output.console)
+        return tables[name] if len(tables) == 1 else {"experiments": tables}

@@ -1,0 +1,60 @@
+"""`sainet train`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tyro.conf import Positional
+
+from sainet.cli.devices import use_devices
+from sainet.cli.output import Output
+from sainet.cli.progress import progress_bar
+from sainet.training.config import FitConfig, ModelKind
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a network on stored pushes by the paper's recipe."""
+
+    model: Positional[ModelKind]
+    """in: the network alone. sain: around an engine's prediction."""
+    data: Path
+    """Dataset to train on."""
+    out: Path
+    """Run folder to write; the same settings go on where they stopped."""
+    assumed_engine: str = "planar"
+    """Engine whose stored prediction SAIN corrects."""
+    config: FitConfig = field(default_factory=FitConfig)
+    devices: int | None = None
+    """CPU devices to split a batch over; default: one a core."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Train the network and draw its learning curve."""
+        use_devices(self.devices)
+        from sainet.datasets.store import open_store
+        from sainet.experiments.curves import draw_history
+        from sainet.training.fit import fit
+
+        store = open_store(self.data)
+        done = 0
+        title = f"Training {self.model.upper()}"
+        with progress_bar(title, self.config.iterations, self.output) as advance:
+
+            def on_step(iteration: int, loss: float) -> None:
+                nonlocal done
+                advance(iteration - done, f"loss {loss:.3g}")
+                done = iteration
+
+            result = fit(
+                self.model,
+                store,
+                self.config,
+                self.out,
+                assumed_engine=self.assumed_engine,
+                on_step=on_step,
+            )
+        curve = draw_history(result, self.out / "learning-curve.svg")
+        self.output.say(f"{self.model.upper()} is in {self.out}, its curve in {curve}")
+        loss = result.history[-1]["loss"] if result.history else None
+        return {"out": str(self.out), "model": self.model, "loss": loss}

@@ -1,0 +1,63 @@
+"""The chain that every experiment walks: simulate, train, compare."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate
+from sainet.datasets.store import Store
+from sainet.evaluation.evaluate import Evaluation, evaluate
+from sainet.models.registry import NamedDynamics, load_dynamics
+from sainet.training.config import FitConfig, ModelKind
+from sainet.training.fit import FitResult, fit
+
+Advance = Callable[[int, str], None]
+Bar = Callable[[str, int], AbstractContextManager[Advance]]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """How an experiment does its steps and tells of them."""
+
+    out: Path
+    executor: Executor
+    say: Callable[[str], None]
+    bar: Bar
+
+    def simulate(self, name: str, config: GenerateConfig) -> Store:
+        """Generate a dataset into a folder of that name."""
+        with self.bar(f"Simulating {name}", config.pushes) as advance:
+            return generate(
+                config,
+                self.out / name,
+                executor=self.executor,
+                on_pushes=lambda pushes: advance(pushes, ""),
+            )
+
+    def train(self, model: ModelKind, store: Store, config: FitConfig) -> FitResult:
+        """Train a network into a folder of its name."""
+        done = 0
+        with self.bar(f"Training {model.upper()}", config.iterations) as advance:
+
+            def on_step(iteration: int, loss: float) -> None:
+                nonlocal done
+                advance(iteration - done, f"loss {loss:.3g}")
+                done = iteration
+
+            return fit(model, store, config, self.out / model, on_step=on_step)
+
+    def compare(self, models: list[NamedDynamics], store: Store) -> Evaluation:
+        """Measure the errors of models on the same pushes."""
+        total = len(models) * store.info.pushes
+        with self.bar("Predicting", total) as advance:
+            return evaluate(
+                models, store, on_pushes=lambda model, pushes: advance(pushes, model)
+            )
+
+    def models(self) -> list[NamedDynamics]:
+        """Return the rows of the paper's tables, physics-calibrated beside them."""
+        networks = [str(self.out / name) for name in ("in", "sain")]
+        return [load_dynamics(n) for n in ("physics", "physics-calibrated", *networks)]

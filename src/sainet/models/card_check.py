@@ -1,0 +1,82 @@
+"""What a card may say: checked when it is read, before anything is made of it."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from sainet.errors import BadCheckpoint
+from sainet.models.features import ACTION_SIZE
+
+_Check = tuple[Callable[[Any], bool], str]
+
+
+def _is_number(value: object) -> bool:
+    known = isinstance(value, int | float) and not isinstance(value, bool)
+    return known and math.isfinite(value)
+
+
+def _is_positive_list(value: object) -> bool:
+    return (
+        isinstance(value, list)
+        and len(value) > 0
+        and all(_is_number(v) and v > 0 for v in value)
+    )
+
+
+def _or_none(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: value is None or check(value)
+
+
+def _is(kind: type) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, kind)
+
+
+_FIELDS: dict[str, _Check] = {
+    "model": (lambda v: v in ("in", "sain"), "'in' or 'sain'"),
+    "kind": (lambda v: v in tuple(ACTION_SIZE), "one of " + ", ".join(ACTION_SIZE)),
+    "time_step": (
+        lambda v: isinstance(v, float) and 0 < v < 1,
+        "in seconds, between 0 and 1",
+    ),
+    "features": (lambda v: v == "paper", "'paper'"),
+    "inner_engine": (_or_none(_is(str)), "the name of an engine or null"),
+    "truth_engine": (_is(str), "the name of an engine"),
+    "assumed": (_or_none(_is(dict)), "an object or null"),
+    "data": (_is(str), "a hash"),
+    "data_seed": (_or_none(_is_number), "a number or null"),
+    "weights": (_is(str), "a hash"),
+    "config": (_is(dict), "an object"),
+    "manifest": (_is(dict), "an object"),
+    "final_loss": (_or_none(_is_number), "a number or null"),
+}
+
+_ASSUMED: dict[str, _Check] = {
+    "mass": (_or_none(_is_positive_list), "a list of positive numbers (kg) or null"),
+    "radius": (_or_none(_is_positive_list), "a list of positive numbers (m) or null"),
+    "friction": (
+        _or_none(lambda v: _is_number(v) and v >= 0),
+        "a number from 0 up or null",
+    ),
+}
+
+
+def check_card(path: Path, found: dict[str, Any]) -> None:
+    """Raise `BadCheckpoint` if a field holds what no card of ours says.
+
+    Args:
+        path: of the card, to be named.
+        found: all fields of the card, as they were read.
+    """
+    for name, check in _FIELDS.items():
+        _require(path, name, found[name], check)
+    for name, check in _ASSUMED.items():
+        _require(path, f"assumed.{name}", (found["assumed"] or {}).get(name), check)
+
+
+def _require(path: Path, name: str, value: object, check: _Check) -> None:
+    good, wanted = check
+    if not good(value):
+        raise BadCheckpoint(
+            f"{path}: {name} is {value!r}; it must be {wanted}. Train the network again."
+        )

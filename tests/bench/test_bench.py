@@ -1,0 +1,232 @@
+"""The benchmarks count the work they say, measure it and compare like with like."""
+
+import json
+import math
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import pytest
+from jax.extend.core import ClosedJaxpr, Jaxpr
+
+from sainet.bench import CASES, load_case
+from sainet.bench import training as training_case
+from sainet.bench.ceiling import ceiling_gflops
+from sainet.bench.peer import TorchPeer, missing_torch, run_torch, save_problem
+from sainet.bench.problem import Problem, make_problem
+from sainet.bench.timing import median_seconds
+from sainet.bench.training import TrainingLoop, counted_gflop
+from sainet.errors import BadInput, SainetError, UnknownName
+from sainet.models.features import Drive, FeatureSizes, Still
+from sainet.models.interaction import InteractionNetwork
+from sainet.training.step import trained_layers, with_layers
+
+TIME_STEP = 1 / 240
+
+
+def network_of(kind: str, *, augmented: bool) -> InteractionNetwork:
+    sizes = FeatureSizes(kind, augmented)
+    return InteractionNetwork(sizes, time_step=TIME_STEP, key=jax.random.key(0))
+
+
+def test_the_counted_work_is_what_one_counts_by_hand():
+    rel = 15 * 128 + 128 * 64 + 64 * 32 + 32 * 16
+    dyn = 29 * 128 + 128 * 64 + 64 * 32 + 32 * 16 + 16 * 3
+    by_hand = 3 * 2 * (2 * rel + 2 * dyn) * 100 * 200 / 1e9
+    network = network_of("robot", augmented=True)
+    assert counted_gflop(network, 100, 200, 2) == pytest.approx(by_hand)
+    assert by_hand == pytest.approx(6.52, abs=0.01)
+
+
+def products(jaxpr: Jaxpr) -> int:
+    """Operations of all matrix products, 2 M K N each, at any depth."""
+    total = 0
+    for equation in jaxpr.eqns:
+        if equation.primitive.name == "dot_general":
+            (contracted, _), _ = equation.params["dimension_numbers"]
+            shape = equation.invars[0].aval.shape
+            inner = math.prod(shape[axis] for axis in contracted)
+            total += 2 * equation.outvars[0].aval.size * inner
+        nested = jax.tree.leaves(equation.params, is_leaf=is_jaxpr)
+        total += sum(products(getattr(j, "jaxpr", j)) for j in nested if is_jaxpr(j))
+    return total
+
+
+def is_jaxpr(value: object) -> bool:
+    return isinstance(value, Jaxpr | ClosedJaxpr)
+
+
+@pytest.mark.parametrize("bodies", [2, 3])
+@pytest.mark.parametrize("augmented", [False, True])
+@pytest.mark.parametrize("kind", ["robot", "direct-force"])
+def test_the_counted_work_is_what_jax_compiles(kind, augmented, bodies):
+    network, pushes = network_of(kind, augmented=augmented), 7
+    drive, still = (
+        Drive(*driven(kind, augmented, pushes, bodies)),
+        stills(pushes, bodies),
+    )
+
+    def loss(layers, motion):
+        step = jax.vmap(with_layers(network, layers).step)
+        return jnp.sum(step(motion, still, drive) ** 2)
+
+    gradient = jax.value_and_grad(loss, argnums=(0, 1))
+    motion = jnp.ones((pushes, bodies, 6))
+    jaxpr = jax.make_jaxpr(gradient)(trained_layers(network), motion)
+    counted = counted_gflop(network, pushes, 1, bodies)
+    assert products(jaxpr.jaxpr) == round(counted * 1e9)
+
+
+def driven(kind: str, augmented: bool, pushes: int, bodies: int) -> list[jax.Array]:
+    action, pusher = (2, 2) if kind == "robot" else (4, 0)
+    simulated = 3 * augmented
+    shapes = (action,), (pusher,), (bodies, simulated), (bodies, simulated)
+    return [jnp.ones((pushes, *shape)) for shape in shapes]
+
+
+def stills(pushes: int, bodies: int) -> Still:
+    each = jnp.ones((pushes, bodies))
+    return Still(each, each, each, jnp.ones(pushes))
+
+
+def all_finite(figures: dict, *, but: tuple[str, ...] = ()) -> bool:
+    return all(math.isfinite(v) and v > 0 for k, v in figures.items() if k not in but)
+
+
+def test_engines_reports_what_the_docs_say():
+    figures = load_case("engines")(2, batch=6, steps=60)
+    assert set(figures) == {
+        "planar_scene_steps_per_s",
+        "batch",
+        "steps",
+        "devices",
+        "runs",
+    }
+    assert all_finite(figures)
+    sizes = [figures[name] for name in ("batch", "steps", "devices", "runs")]
+    assert sizes == [6, 60, jax.device_count(), 2]
+    json.dumps(figures, allow_nan=False)
+
+
+def test_training_reports_what_the_docs_say():
+    figures = load_case("training")(2, pushes=3, steps=4, repeats=1)
+    assert set(figures) == {
+        "iteration_ms",
+        "ceiling_gflops",
+        "ceiling_fraction",
+        "eager_torch_ratio",
+        "work_gflop",
+        "devices",
+        "runs",
+        "reason",
+    }
+    assert figures["reason"] == missing_torch()
+    has_torch = figures["reason"] is None
+    assert (figures["eager_torch_ratio"] is not None) == has_torch
+    absent = "reason" if has_torch else "eager_torch_ratio"
+    assert all_finite(figures, but=("reason", absent))
+    network = network_of("robot", augmented=True)
+    assert figures["work_gflop"] == counted_gflop(network, 3, 4, 2)
+    json.dumps(figures, allow_nan=False)
+
+
+def test_every_figure_is_the_median_of_what_was_measured_side_by_side():
+    measured = [
+        training_case.Measurement(100.0, 50.0, 100.0),
+        training_case.Measurement(200.0, 20.0, 100.0),
+        training_case.Measurement(50.0, 40.0, 160.0),
+    ]
+    assert training_case._figures(measured, 1.0) == {
+        "iteration_ms": 40.0,
+        "ceiling_gflops": 100.0,
+        "ceiling_fraction": pytest.approx(0.25),  # of 0.2, 0.25 and 0.5
+        "eager_torch_ratio": pytest.approx(4.0),  # of 2, 5 and 4
+    }
+
+
+def test_the_median_leaves_the_warm_up_and_the_odd_one_out():
+    naps = iter([0.2, 0.01, 0.3, 0.01, 0.01])
+    assert 0.01 <= median_seconds(lambda: time.sleep(next(naps)), 4) < 0.15
+    assert next(naps, None) is None
+
+
+def test_the_ceiling_is_a_rate_that_a_machine_can_have():
+    assert 0.1 < ceiling_gflops(2) < 1e6
+
+
+def test_an_unknown_case_names_those_there_are():
+    with pytest.raises(UnknownName, match="'trainin'.*engines, training"):
+        load_case("trainin")
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_case_without_runs_is_bad_input(name):
+    with pytest.raises(BadInput, match="--runs is 0"):
+        load_case(name)(0)
+
+
+def test_listing_the_cases_leaves_jax_alone():
+    code = "import sys, sainet.bench; sys.exit('jax' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+class Trained(NamedTuple):
+    problem: Problem
+    losses: list[float]
+
+
+@pytest.fixture(scope="module")
+def trained() -> Trained:
+    problem = make_problem(5, 60)
+    loop = TrainingLoop(problem)
+    later = [float(loop.advance()[1]) for _ in range(3)]
+    return Trained(problem, [loop.first_loss, *later])
+
+
+def test_the_loop_that_is_timed_trains(trained: Trained):
+    assert sorted(trained.losses, reverse=True) == trained.losses
+
+
+# PyTorch is no dependency: these skip even where SAINET_REQUIRE_ALL=1.
+needs_torch = pytest.mark.skipif(
+    missing_torch() is not None, reason=str(missing_torch())
+)
+
+
+@needs_torch
+def test_torch_computes_the_same_losses_and_steps(trained: Trained, tmp_path: Path):
+    path = save_problem(tmp_path / "problem.npz", trained.problem)
+    result = run_torch(path, 3)
+    assert result["loss"] == pytest.approx(trained.losses[0], rel=1e-4)
+    # The later ones hold the gradient, its clipping and Adam against each other.
+    assert result["losses"] == pytest.approx(trained.losses, rel=1e-3)
+    assert result["iteration_ms"] > 0
+
+
+@needs_torch
+def test_a_peer_that_fails_says_why(tmp_path: Path):
+    with pytest.raises(SainetError, match="absent.npz"):
+        run_torch(tmp_path / "absent.npz", 1)
+
+
+@pytest.mark.parametrize("loss", [1.01, 0.99, math.nan])
+def test_a_peer_that_does_other_work_is_refused(loss, monkeypatch):
+    result = {"loss": loss, "iteration_ms": 7.0}
+    monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
+    with pytest.raises(SainetError, match="same work"):
+        TorchPeer(Path("problem.npz"), 1.0).iteration_ms()
+
+
+def test_a_peer_may_differ_by_rounding(monkeypatch):
+    result = {"loss": 1.0005, "iteration_ms": 7.0}
+    monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
+    assert TorchPeer(Path("problem.npz"), 1.0).iteration_ms() == 7.0
+
+
+def test_without_an_environment_the_reason_names_the_way_out(monkeypatch, tmp_path):
+    monkeypatch.setattr("sainet.bench.peer.FOLDER", tmp_path)
+    assert "make torch-env" in str(missing_torch())

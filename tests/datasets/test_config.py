@@ -1,0 +1,104 @@
+"""Settings that no scene can have are refused, by the name of their option."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from sainet.datasets.config import GenerateConfig, bounds
+from sainet.engines.config import NoiseConfig
+from sainet.errors import BadInput
+from support import SOURCE
+
+NAN, INFINITE = float("nan"), float("inf")
+
+BAD = [
+    ("engine", "plannar"),
+    ("assumed_engine", ""),
+    ("disks", 0),
+    ("pushes", 0),
+    ("pushes", -3),
+    ("chunk_size", 0),
+    ("force_steps", 0),
+    ("hold_steps", -1),
+    ("seed", -1),
+    ("mass_kg", (0.0, 1.0)),
+    ("mass_kg", (-1.0,)),
+    ("mass_kg", (NAN, 1.0)),
+    ("mass_kg", (2.0, 1.0)),
+    ("radius_mm", (0.0,)),
+    ("radius_mm", (50.0, NAN)),
+    ("radius_mm", (50.0, INFINITE)),
+    ("stroke_mm", (0.0,)),
+    ("speed_mm_s", (-50.0,)),
+    ("table_friction", (-0.1, 0.2)),
+    ("table_friction", (NAN,)),
+    ("contact_friction", (0.3, 0.2)),
+    ("pusher_radius_mm", 0.0),
+    ("pusher_radius_mm", NAN),
+    ("pusher_radius_mm", INFINITE),
+    ("force_n", NAN),
+    ("force_n", -8.0),
+    ("contact_angle_deg", 90.0),
+    ("contact_angle_deg", NAN),
+    ("direction_deg", -1.0),
+    ("placement_deg", 120.0),
+    ("gap_mm", -1.0),
+    ("gap_mm", NAN),
+    ("gap_mm", INFINITE),
+]
+
+
+@pytest.mark.parametrize(("name", "value"), BAD)
+def test_bad_settings_are_refused_by_their_option(name, value):
+    option = "--" + name.replace("_", "-")
+    with pytest.raises(BadInput, match=f"^{option} is .*; it must be ") as refused:
+        GenerateConfig(**{name: value})
+    assert "\n" not in str(refused.value)
+    assert refused.value.exit_status == 2
+
+
+def test_values_of_another_type_are_refused_too():
+    """In a process of its own: here the checked annotations come first."""
+    script = """
+from sainet.datasets.config import GenerateConfig
+from sainet.errors import BadInput
+bad = [("setup", "pull"), ("noise_level", "loud"), ("mass_kg", ()),
+       ("mass_kg", (1.0, 2.0, 3.0))]
+for name, value in bad:
+    try:
+        GenerateConfig(**{name: value})
+    except BadInput as error:
+        assert str(error).startswith("--" + name.replace("_", "-")), error
+    else:
+        raise SystemExit(f"{name}={value} was taken")
+"""
+    environment = os.environ | {"PYTHONPATH": str(SOURCE.parent)}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("value", [-1.0, NAN, INFINITE])
+@pytest.mark.parametrize("name", NoiseConfig.__dataclass_fields__)
+def test_bad_noise_is_refused_by_its_option(name, value):
+    option = "--noise." + name.replace("_", "-")
+    with pytest.raises(BadInput, match=f"^{option} is "):
+        GenerateConfig(noise=NoiseConfig(**{name: value}))
+
+
+@pytest.mark.parametrize("name", ["correlation_time", "friction_length_mm"])
+def test_noise_cannot_be_correlated_over_nothing(name):
+    with pytest.raises(BadInput, match="must be positive"):
+        GenerateConfig(noise=NoiseConfig(**{name: 0.0}))
+
+
+def test_settings_at_the_edge_are_taken():
+    config = GenerateConfig(
+        pushes=1, hold_steps=0, contact_angle_deg=0, table_friction=(0.0,), gap_mm=0.0
+    )
+    assert bounds(config.table_friction) == (0.0, 0.0)
+    assert bounds(config.mass_kg) == (0.85, 1.15)

@@ -1,0 +1,252 @@
+"""Reading recorded pushes: the table, the authors' log, and what is neither."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from sainet.datasets.mitpush_csv import NUMBERS
+from sainet.datasets.mitpush_log import EndpointLog, read_log
+from sainet.datasets.mitpush_mat import FIELDS
+from sainet.errors import BadTable
+
+ROW = {
+    **{"surface": "abs", "shape": "ellip1", "vel_mm_s": 10.0},
+    **{"obj_x0": 0.3, "obj_y0": 0.0, "obj_th0": 1.0},
+    **{"obj_x1": 0.32, "obj_y1": 0.01, "obj_th1": 1.2},
+    **{"tip_x0": 0.2427, "tip_y0": 0.0, "tip_x1": 0.2927, "tip_y1": 0.0},
+    **{"zhou_poly4_x1": 0.321, "zhou_poly4_y1": 0.012, "zhou_poly4_th1": 1.25},
+}
+
+
+def write_csv(path: Path, *rows: dict) -> Path:
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(ROW))
+        writer.writeheader()
+        writer.writerows(ROW | row for row in rows)
+    return path
+
+
+def write_mat(path: Path, rows: list[dict], **more: object) -> Path:
+    """A log in the layout of the authors: a column of cells that hold structures."""
+    records = np.empty((len(rows), 1), object)
+    for index, row in enumerate(rows):
+        columns = FIELDS.items()
+        record = {f: np.array([[row[n]] for n in names]) for f, names in columns}
+        records[index, 0] = record
+    savemat(path, {"record_all": records, **more}, do_compression=True)
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(BadTable) as caught:
+        read_log(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert path.name in message
+    return message
+
+
+def assert_same(one: EndpointLog, other: EndpointLog):
+    names = ("speed", "before", "after", "tip_before", "tip_after", "published")
+    for name in names:
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    assert one.surface == other.surface
+    assert one.shape == other.shape
+    assert one.model == other.model
+
+
+def test_a_table_is_read_in_si_units(tmp_path: Path):
+    log = read_log(write_csv(tmp_path / "t.csv", {}, {"vel_mm_s": 20, "tip_y1": 0.03}))
+    assert log.size == 2
+    np.testing.assert_allclose(log.speed, [0.010, 0.020])
+    np.testing.assert_array_equal(log.before[0], [0.3, 0.0, 1.0])
+    np.testing.assert_array_equal(log.tip_after, [[0.2927, 0.0], [0.2927, 0.03]])
+    np.testing.assert_array_equal(log.published[1], [0.321, 0.012, 1.25])
+    assert log.model == "zhou-poly4"
+
+
+def test_columns_may_come_in_any_order_with_others_between_and_blank_lines(tmp_path):
+    names = ["note", *reversed(ROW)]
+    values = ["hello, you", *(str(v) for v in reversed(ROW.values()))]
+    path = tmp_path / "t.csv"
+    text = ",".join(names) + '\r\n"hello, you",' + ",".join(values[1:]) + "\r\n\r\n"
+    path.write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert_same(read_log(path), read_log(write_csv(tmp_path / "plain.csv", {})))
+
+
+@pytest.mark.recorded
+def test_an_authors_log_reads_as_the_same_rows_of_the_table(
+    tmp_path: Path, recorded_pushes_folder: Path
+):
+    with (recorded_pushes_folder / "ellip1_endpoints.csv").open(newline="") as file:
+        found = [r for r in csv.DictReader(file) if r["surface"] == "plywood"]
+    rows = [r | {n: float(r[n]) for n in NUMBERS} for r in found]
+    table = read_log(
+        write_csv(tmp_path / "t.csv", *[{n: r[n] for n in ROW} for r in rows])
+    )
+    log = read_log(write_mat(tmp_path / "plywood_ellip1_poly4_v10.mat", rows))
+    assert log.size == 261
+    assert_same(log, table)
+
+
+@pytest.mark.recorded
+def test_the_real_log_of_a_square_is_read_whole(recorded_pushes_folder: Path):
+    log = read_log(recorded_pushes_folder / "plywood_rect1_poly4_v10.mat")
+    assert log.size == 396
+    assert set(log.surface) == {"plywood"}
+    assert set(log.shape) == {"rect1"}
+    np.testing.assert_allclose(log.speed, 0.010)
+    np.testing.assert_allclose(
+        log.before[0], [0.34386552, -0.04300157, -1.17121293], atol=1e-8
+    )
+    np.testing.assert_allclose(log.after[0, 0], 0.31308118, atol=1e-8)
+    np.testing.assert_allclose(log.published[0, 2], -1.55485916, atol=1e-8)
+    stroke = np.linalg.norm(log.tip_after - log.tip_before, axis=1)
+    assert stroke.min() > 0.0494
+    assert stroke.max() < 0.0507
+
+
+def test_a_missing_file_says_where_the_pushes_come_from(tmp_path: Path):
+    for path in (tmp_path, tmp_path / "ellip1_endpoints.csv", tmp_path / "no" / "dir"):
+        with pytest.raises(BadTable, match="robinzhoucmu/Pushing.*eval_logs"):
+            read_log(path)
+
+
+@pytest.mark.parametrize("name", ["surface", "obj_x1", "tip_y0", "zhou_poly4_th1"])
+def test_a_missing_column_is_named(tmp_path: Path, name: str):
+    path = write_csv(tmp_path / "t.csv", {})
+    path.write_text(path.read_text().replace(name, "else"))
+    assert f"column {name} is missing" in refusal(path)
+
+
+def test_a_column_that_is_there_twice_is_refused(tmp_path: Path):
+    path = write_csv(tmp_path / "t.csv", {})
+    path.write_text(path.read_text().replace("obj_y0", "obj_x0"))
+    assert "column obj_x0 is there twice" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("row", "parts"),
+    [
+        ({"obj_x1": "nan"}, ["row 3", "obj_x1 is nan", "finite"]),
+        ({"tip_y1": "-inf"}, ["row 3", "tip_y1 is -inf", "finite"]),
+        ({"obj_th0": "12.3.4"}, ["row 3", "obj_th0 is '12.3.4'", "no number"]),
+        ({"tip_x0": ""}, ["row 3", "tip_x0 is ''", "no number"]),
+        ({"vel_mm_s": 0}, ["row 3", "vel_mm_s is 0.0", "from 1 to 1000 mm/s"]),
+        ({"vel_mm_s": -10}, ["row 3", "vel_mm_s is -10.0"]),
+        ({"vel_mm_s": 0.01}, ["row 3", "vel_mm_s is 0.01"]),
+        ({"tip_x0": 242.7}, ["row 3", "tip_x0 is 242.7", "looks like millimetres"]),
+        ({"obj_th1": 57.3}, ["row 3", "obj_th1 is 57.3", "looks like degrees"]),
+        ({"surface": " "}, ["row 3", "surface is ''"]),
+    ],
+)
+def test_a_bad_value_is_named_with_its_row(tmp_path: Path, row: dict, parts: list[str]):
+    message = refusal(write_csv(tmp_path / "t.csv", {}, row, {}))
+    for part in parts:
+        assert part in message
+
+
+def test_a_cut_row_and_a_long_one_are_named(tmp_path: Path):
+    path = write_csv(tmp_path / "t.csv", {}, {}, {})
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-30])
+    assert "row 4: has 11 fields, not 16" in refusal(path)
+    lines = whole.splitlines()
+    path.write_bytes(b"\n".join([lines[0], lines[1] + b",7", lines[2], b""]))
+    assert "row 2: has 17 fields, not 16" in refusal(path)
+
+
+def test_a_quote_that_never_closes_is_refused(tmp_path: Path):
+    path = write_csv(tmp_path / "t.csv", {}, {}, {})
+    path.write_text(path.read_text().replace("abs", '"abs', 1))
+    refusal(path)
+
+
+def test_no_rows_no_content_and_no_text_are_refused(tmp_path: Path):
+    assert "no rows" in refusal(write_csv(tmp_path / "t.csv"))
+    empty = tmp_path / "empty.csv"
+    empty.touch()
+    assert "empty" in refusal(empty)
+    noise = tmp_path / "noise.csv"
+    noise.write_bytes(np.random.default_rng(0).bytes(5000))
+    assert "no CSV text" in refusal(noise)
+    noise.write_bytes(b"\0" * 5000)
+    refusal(noise)
+
+
+def test_a_table_without_a_last_line_break_is_read_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+):
+    path = write_csv(tmp_path / "t.csv", {})
+    path.write_bytes(path.read_bytes().rstrip())
+    assert read_log(path).size == 1
+    assert "last row" in caplog.text
+
+
+def test_a_log_cut_anywhere_is_refused(tmp_path: Path):
+    path = write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW] * 50)
+    whole = path.read_bytes()
+    for length in range(0, len(whole) - 1, 7):
+        path.write_bytes(whole[:length])
+        refusal(path)
+
+
+def test_a_log_with_changed_bytes_never_ends_in_another_error(tmp_path: Path):
+    path = write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW] * 5)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(300):
+        broken = bytearray(whole)
+        broken[rng.integers(len(whole))] ^= int(rng.integers(1, 256))
+        path.write_bytes(broken)
+        try:
+            read_log(path)
+        except BadTable:
+            refused += 1
+    assert refused > 100
+
+
+def test_random_bytes_are_no_log(tmp_path: Path):
+    path = tmp_path / "abs_ellip1_poly4_v10.mat"
+    path.write_bytes(np.random.default_rng(1).bytes(5000))
+    assert "damaged or no MATLAB file" in refusal(path)
+
+
+@pytest.mark.parametrize("field", FIELDS)
+def test_a_log_that_lacks_a_field_is_refused(tmp_path: Path, field: str):
+    records = np.empty((1, 1), object)
+    names = {f: n for f, n in FIELDS.items() if f != field}
+    records[0, 0] = {f: np.array([[ROW[c]] for c in n]) for f, n in names.items()}
+    path = tmp_path / "abs_ellip1_poly4_v10.mat"
+    savemat(path, {"record_all": records})
+    assert f"record_all[0]: {field} is missing" in refusal(path)
+    savemat(path, {"something": 1.0})
+    assert "record_all is missing" in refusal(path)
+
+
+def test_a_log_with_wrong_sizes_kinds_or_values_is_refused(tmp_path: Path):
+    path = tmp_path / "abs_ellip1_poly4_v10.mat"
+    message = refusal(write_mat(path, [ROW, ROW | {"tip_x1": np.nan}]))
+    assert "record_all[1]: tip_x1 is nan" in message
+    for wrong in (np.ones(4), "text", np.ones(3) * 1j):
+        records = np.empty((1, 1), object)
+        fields = {f: np.array([[ROW[c]] for c in n]) for f, n in FIELDS.items()}
+        records[0, 0] = fields | {"init_pose_gt": wrong}
+        savemat(path, {"record_all": records})
+        assert "init_pose_gt must be 3 real numbers" in refusal(path)
+    savemat(path, {"record_all": np.empty((0, 1), object)})
+    assert "no rows" in refusal(path)
+    savemat(path, {"record_all": np.ones((3, 1))})
+    assert "record_all[0]: init_pose_gt is missing" in refusal(path)
+
+
+def test_the_name_of_a_log_has_to_say_what_it_is(tmp_path: Path):
+    assert "SURFACE_SHAPE_MODEL" in refusal(write_mat(tmp_path / "log.mat", [ROW]))
+    path = tmp_path / "abs_ellip1_poly4_v10.mat"
+    assert read_log(write_mat(path, [ROW], shape_id="ellip1", vel=10)).size == 1
+    assert "'rect1' inside" in refusal(write_mat(path, [ROW], shape_id="rect1"))
+    assert "vel is '20'" in refusal(write_mat(path, [ROW], vel=20))

@@ -1,0 +1,77 @@
+"""Drawn scenes have the paper's distributions, touch, and never overlap."""
+
+import numpy as np
+import pytest
+
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.sampling import chunk_generator, draw
+from sainet.errors import BadInput
+
+
+def drawn(pushes=400, **settings):
+    return draw(GenerateConfig(**settings), chunk_generator(3, 0), pushes)
+
+
+def assert_uniform(values, low, high):
+    assert low <= values.min() < low + 0.1 * (high - low)
+    assert high - 0.1 * (high - low) < values.max() <= high
+    spread = (high - low) / np.sqrt(12)
+    assert values.mean() == pytest.approx((low + high) / 2, abs=0.2 * spread)
+    assert values.std() == pytest.approx(spread, rel=0.15)
+
+
+def test_properties_are_uniform_over_their_ranges():
+    draws = drawn()
+    assert_uniform(draws.mass.ravel(), 0.85, 1.15)
+    assert_uniform(draws.radius.ravel(), 0.05, 0.06)
+    assert_uniform(draws.table_friction, 0.05, 0.25)
+    assert_uniform(draws.contact_angle, -np.pi / 3, np.pi / 3)
+    assert_uniform(draws.direction, -np.pi / 6, np.pi / 6)
+    np.testing.assert_allclose(draws.contact_friction, 0.25)
+    np.testing.assert_allclose(draws.stroke, 0.010)
+    np.testing.assert_allclose(draws.speed, 0.050)
+    assert abs(np.corrcoef(draws.mass[:, 0], draws.radius[:, 0])[0, 1]) < 0.15
+
+
+def test_ranges_of_strokes_are_drawn_from():
+    draws = drawn(stroke_mm=(20.0, 50.0), speed_mm_s=(10.0, 20.0))
+    assert_uniform(draws.stroke, 0.02, 0.05)
+    assert_uniform(draws.speed, 0.01, 0.02)
+
+
+def gaps(draws):
+    offset = draws.position[:, :, None] - draws.position[:, None]
+    reach = draws.radius[:, :, None] + draws.radius[:, None]
+    gap = np.hypot(offset[..., 0], offset[..., 1]) - reach
+    return np.where(np.eye(reach.shape[1], dtype=bool), np.inf, gap)
+
+
+@pytest.mark.parametrize("disks", [2, 3, 4, 6])
+def test_disks_touch_and_do_not_overlap(disks):
+    found = gaps(drawn(disks=disks, pushes=250))
+    assert found.min() > -1e-9
+    np.testing.assert_allclose(found[:, 1:].min(axis=-1), 0, atol=1e-9)
+    if disks == 3:
+        np.testing.assert_allclose(found[:, 0, 1:], 0, atol=1e-9)
+
+
+def test_second_disks_are_in_front_of_the_first():
+    ahead = drawn().position[:, 1]
+    assert_uniform(np.arctan2(ahead[:, 1], ahead[:, 0]), -np.pi / 3, np.pi / 3)
+
+
+def test_a_gap_parts_the_disks():
+    np.testing.assert_allclose(gaps(drawn(gap_mm=2.0))[:, 0, 1], 0.002, atol=1e-9)
+
+
+def test_disks_without_room_are_refused():
+    with pytest.raises(BadInput, match="--disks 3: no room .* widen --placement-deg"):
+        drawn(disks=3, placement_deg=5.0, pushes=1)
+
+
+def test_each_chunk_draws_its_own():
+    one, again, other, seed = (
+        chunk_generator(*key).random() for key in ((0, 0), (0, 0), (0, 1), (1, 0))
+    )
+    assert one == again
+    assert len({one, other, seed}) == 3

@@ -1,0 +1,102 @@
+"""Networks and pushes that the tests of models, training and contracts share."""
+
+from functools import lru_cache
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from contracts.worlds import engine, pushed
+from sainet.datasets.config import GenerateConfig
+from sainet.engines.assumed import PAPER_MASS, PAPER_RADIUS, AssumedProperties
+from sainet.engines.base import AbstractEngine
+from sainet.models.dynamics import (
+    AbstractDynamics,
+    LearnedDynamics,
+    PhysicsDynamics,
+    SimulatorAugmented,
+)
+from sainet.models.features import FeatureSizes
+from sainet.models.interaction import InteractionNetwork, Scales
+from sainet.pushes import Controls
+from sainet.scene import TIME_STEP, Scene, State, Trajectory
+
+PUSHES = 4
+STEPS = 24
+
+
+@lru_cache
+def network(model: str, kind: str, seed: int = 0) -> InteractionNetwork:
+    """An untrained network with scales that matter and effects that are large."""
+    sizes = FeatureSizes(kind, model == "sain")
+    rng = np.random.default_rng(seed)
+
+    def drawn(low, high, size):
+        return jnp.asarray(rng.uniform(low, high, size), jnp.float32)
+
+    scales = Scales(
+        pair_mean=drawn(-0.1, 0.1, sizes.pair),
+        pair_deviation=drawn(0.1, 0.3, sizes.pair),
+        body_mean=drawn(-0.1, 0.1, sizes.body),
+        body_deviation=drawn(0.1, 0.3, sizes.body),
+        acceleration=jnp.array([3.0, 3.0, 30.0]),
+    )
+    key = jax.random.key(seed)
+    made = InteractionNetwork(sizes, time_step=TIME_STEP, key=key, scales=scales)
+    layers, larger = (lambda n: (n.rel, n.dyn)), lambda w: 1.5 * w
+    return eqx.tree_at(layers, made, jax.tree.map(larger, layers(made)))
+
+
+class Glide(AbstractEngine):
+    """Disks that drift off, the heavier the slower: an engine that compiles at once."""
+
+    def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
+        steps = jnp.arange(1, controls.steps + 1) * scene.time_step
+        rate = jnp.stack([0.03 / scene.mass, 20 * scene.radius**2], axis=-1)
+        path = steps[:, None, None] ** 2 * rate[:, None] + initial.position[:, None]
+        velocity = 2 * steps[:, None, None] * rate[:, None]
+        angle = initial.angle[:, None] + 0.2 * jnp.sin(40 * steps)[:, None]
+        spin = jnp.broadcast_to(8 * jnp.cos(40 * steps)[:, None], angle.shape)
+        pusher = jnp.broadcast_to(
+            initial.pusher_position[:, None], (*angle.shape[:2], 2)
+        )
+        return Trajectory(State(path, angle, velocity, spin, pusher, 0 * pusher))
+
+
+@lru_cache
+def pushes(kind: str, bodies: int, steps: int = STEPS) -> tuple[Scene, State, Controls]:
+    """Pushes of the paper somewhere on the table, at any angle, already in motion."""
+    config = GenerateConfig(setup=kind, disks=bodies, pushes=PUSHES)
+    scene, initial, controls = pushed(config, 3, steps)
+    rng = np.random.default_rng(7)
+    angle = jnp.asarray(rng.uniform(-3, 3, initial.angle.shape), jnp.float32)
+    return scene, eqx.tree_at(lambda s: s.angle, initial, angle), controls
+
+
+def assumed(order: list[int]) -> AssumedProperties:
+    """The planar engine with the paper's properties, disks in another order."""
+    mass, radius = (
+        (*values, *[sum(values) / 2] * len(order)) for values in (PAPER_MASS, PAPER_RADIUS)
+    )
+    return AssumedProperties(
+        engine("planar"),
+        mass=tuple(mass[i] for i in order),
+        radius=tuple(radius[i] for i in order),
+    )
+
+
+def dynamics(model: str, kind: str, order: list[int]) -> AbstractDynamics:
+    """A model by name; what it assumes of the disks follows their order."""
+    if model == "physics":
+        return PhysicsDynamics(assumed(order))
+    if model == "in":
+        return LearnedDynamics(network("in", kind))
+    return SimulatorAugmented(network("sain", kind), assumed(order))
+
+
+def quick_dynamics(model: str, kind: str) -> LearnedDynamics | SimulatorAugmented:
+    """IN, or SAIN around an engine that compiles at once."""
+    if model == "in":
+        return LearnedDynamics(network("in", kind))
+    return SimulatorAugmented(network("sain", kind), Glide())

@@ -1,0 +1,154 @@
+"""The interaction network against the paper's equations, written as plain loops."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from contracts.worlds import make_scene
+from models import naive
+from models.samples import PUSHES, assumed, dynamics, pushes, quick_dynamics
+from sainet.models.dynamics import predict
+from sainet.models.frame import (
+    controls_to_frame,
+    motion_from_frame,
+    motion_to_frame,
+    push_frame,
+)
+from sainet.pushes import Push, path_controls
+from sainet.scene import TIME_STEP, at_rest, pack_motion
+
+every_model = pytest.mark.parametrize("model", ["in", "sain"])
+every_kind = pytest.mark.parametrize("kind", ["robot", "direct-force"])
+
+
+def moving_pushes(kind: str, bodies: int, steps: int = 24):
+    """Pushes whose disks already move, so that no feature is zero."""
+    scene, initial, controls = pushes(kind, bodies, steps)
+    rng = np.random.default_rng(bodies)
+    where = lambda s: (s.velocity, s.spin)  # noqa: E731
+    drawn = (
+        jnp.asarray(rng.normal(0, 0.05, x.shape), jnp.float32) for x in where(initial)
+    )
+    return scene, eqx.tree_at(where, initial, tuple(drawn)), controls
+
+
+@pytest.mark.parametrize("bodies", [1, 2, 3])
+@every_kind
+@every_model
+def test_the_network_is_the_papers_equations(model, kind, bodies):
+    scene, initial, controls = moving_pushes(kind, bodies)
+    made = quick_dynamics(model, kind)
+    found = np.asarray(pack_motion(predict(made, scene, initial, controls).states))
+    simulated = None
+    if model == "sain":
+        rollout = eqx.filter_jit(made.engine.rollout)(scene, initial, controls)
+        simulated = np.asarray(pack_motion(rollout.states), np.float64)
+    for push in range(PUSHES):
+        wanted = naive.rollout(made.network, scene, initial, controls, simulated, push)
+        np.testing.assert_allclose(found[push], wanted, atol=2e-5)
+
+
+@every_kind
+@every_model
+def test_effects_and_the_simulator_matter(model, kind):
+    """Guards the oracle: a part of the network that did nothing would go unseen."""
+    scene, initial, controls = moving_pushes(kind, 2)
+    made = quick_dynamics(model, kind)
+    plain = predict(made, scene, initial, controls).final.position
+
+    def moved_by(other):
+        gap = predict(other, scene, initial, controls).final.position - plain
+        return float(jnp.abs(gap).max())
+
+    silent = eqx.tree_at(
+        lambda d: d.network.rel, made, jax.tree.map(jnp.zeros_like, made.network.rel)
+    )
+    assert moved_by(silent) > 1e-4
+    if model == "sain":
+        other = eqx.tree_at(lambda d: d.engine, made, assumed([0, 1]))
+        assert moved_by(other) > 1e-5
+
+
+def test_a_network_is_told_masses_and_radii_but_never_a_friction():
+    scene, initial, controls = pushes("robot", 2)
+    made = quick_dynamics("in", "robot")
+    plain = predict(made, scene, initial, controls).final.position
+    for name in ("table_friction", "disk_friction", "pusher_friction"):
+        other = eqx.tree_at(lambda s: getattr(s, name), scene, getattr(scene, name) + 0.3)
+        same = predict(made, other, initial, controls).final.position
+        np.testing.assert_array_equal(same, plain)
+    for name in ("mass", "radius"):
+        other = eqx.tree_at(lambda s: getattr(s, name), scene, getattr(scene, name) * 1.05)
+        differs = predict(made, other, initial, controls).final.position
+        assert np.abs(np.asarray(differs - plain)).max() > 1e-6
+
+
+def test_static_properties_are_no_part_of_a_prediction():
+    scene, initial, controls = pushes("robot", 2)
+    states = predict(quick_dynamics("in", "robot"), scene, initial, controls).states
+    names = {"position", "angle", "velocity", "spin"}
+    assert vars(states).keys() == names | {"pusher_position", "pusher_velocity"}
+
+
+def test_the_nearest_disk_is_the_pushed_one():
+    # By surfaces: the centre of disk 1 is nearer, the surface of disk 2 is.
+    scene = make_scene([[1.0, 1.0, 1.0]], [[0.02, 0.06, 0.05]])
+    place = jnp.array([[[0.07, 0.0], [0.0, 0.08], [0.3, 0.3]]])
+    state = at_rest(place, jnp.zeros((1, 3)), jnp.zeros((1, 2)))
+    frame = push_frame(scene, state)
+    np.testing.assert_array_equal(frame.pushed, [[0, 1, 0]])
+    np.testing.assert_allclose(frame.origin, [[0, 0.08]])
+    np.testing.assert_allclose(frame.angle, [np.pi / 2], rtol=1e-6)
+
+
+@every_kind
+def test_the_push_frame_looks_along_the_contact_normal(kind):
+    scene, initial, controls = moving_pushes(kind, 2)
+    frame = push_frame(scene, initial)
+    motion = pack_motion(initial)
+    local = motion_to_frame(motion, frame)
+    for push in range(PUSHES):
+        one = naive.local_push(scene, initial, controls, push)
+        np.testing.assert_allclose(local[push], one.start, atol=1e-6)
+        np.testing.assert_allclose(local[push, one.pushed, :2], 0, atol=1e-7)
+    np.testing.assert_allclose(motion_from_frame(local, frame), motion, atol=1e-6)
+    commands = controls_to_frame(controls, frame)
+    if kind == "robot":
+        gap = scene.radius[:, 0] + scene.pusher_radius
+        # The command at the end of the first step is at most one step further on.
+        np.testing.assert_allclose(commands.position[:, 0, 0], -gap, atol=3e-4)
+    else:
+        np.testing.assert_allclose(commands.contact_offset[:, 1], 0, atol=1e-6)
+
+
+def overlapping_push():
+    """Disks that overlap by 3 mm, the pusher 3 mm inside the first, for 200 steps."""
+    scene = make_scene([[0.9, 1.1]] * 2, [[0.055, 0.052]] * 2)
+    place = jnp.array([[[0.0, 0.0], [0.104, 0.0]], [[0.2, 0.1], [0.2, 0.204]]])
+    pusher = place[:, 0] - jnp.array([[0.0568, 0.0], [0.0, 0.0568]])
+    state = at_rest(place, jnp.zeros((2, 2)), pusher)
+    one = jnp.ones(2)
+    push = Push(0 * one, 0 * one, 0.01 * one, 0.05 * one)
+    heading = jnp.array([[1.0, 0.0], [0.0, 1.0]])
+    controls = path_controls(push, pusher, heading, steps=200, time_step=TIME_STEP)
+    return scene, state, controls
+
+
+@every_model
+def test_gradients_are_finite_over_a_whole_push_that_starts_in_overlap(model):
+    scene, state, controls = overlapping_push()
+    made = dynamics(model, "robot", [0, 1])
+
+    @eqx.filter_jit
+    @eqx.filter_grad
+    def gradient(net, made, *push):
+        made = eqx.tree_at(lambda d: d.network, made, net)
+        _, path = made.advance(push[0], made.begin(*push[:2]), push[2])
+        return jnp.sum(path.final.position**2)
+
+    found = gradient(made.network, made, scene, state, controls)
+    layers = jax.tree.leaves((found.rel, found.dyn))
+    assert all(np.isfinite(leaf).all() for leaf in layers)
+    assert max(np.abs(leaf).max() for leaf in layers) > 1e-6
