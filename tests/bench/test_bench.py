@@ -112,6 +112,7 @@ def test_engines_reports_what_the_docs_say():
     json.dumps(figures, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_training_reports_what_the_docs_say():
     figures = load_case("training")(2, pushes=3, steps=4, repeats=1)
     assert set(figures) == {
@@ -181,9 +182,9 @@ class Trained(NamedTuple):
 
 @pytest.fixture(scope="module")
 def trained() -> Trained:
-    problem = make_problem(5, 60)
+    problem = make_problem(5, 20)
     loop = TrainingLoop(problem)
-    later = [float(loop.advance()[1]) for _ in range(3)]
+    later = [float(loop.advance()[1]) for _ in range(2)]
     return Trained(problem, [loop.first_loss, *later])
 
 
@@ -200,10 +201,10 @@ needs_torch = pytest.mark.skipif(
 @needs_torch
 def test_torch_computes_the_same_losses_and_steps(trained: Trained, tmp_path: Path):
     path = save_problem(tmp_path / "problem.npz", trained.problem)
-    result = run_torch(path, 3)
-    assert result["loss"] == pytest.approx(trained.losses[0], rel=1e-4)
+    result = run_torch(path, 2)
+    assert result["loss"] == pytest.approx(trained.losses[0], rel=1e-5)
     # The later ones hold the gradient, its clipping and Adam against each other.
-    assert result["losses"] == pytest.approx(trained.losses, rel=1e-3)
+    assert result["losses"] == pytest.approx(trained.losses, rel=3e-5)
     assert result["iteration_ms"] > 0
 
 

@@ -370,8 +370,8 @@ def assert_steps_add_up(initial: State, states: State):
         (initial.angle, states.angle, states.spin),
         (initial.pusher_position, states.pusher_position, states.pusher_velocity),
     ]
-    for start, pose, rate in pairs:
-        pose, rate = np.asarray(pose, np.float64), np.asarray(rate, np.float64)
+    for start, *after in pairs:
+        pose, rate = (np.asarray(values, np.float64) for values in after)
         before = np.concatenate([np.asarray(start)[:, None], pose[:, :-1]], axis=1)
         error = np.abs(before + TIME_STEP * rate - pose)
         rounding = np.spacing(np.abs(pose).astype(np.float32) + np.float32(0.01))
@@ -536,12 +536,13 @@ def _slopes(name: str, bodies: int, step: float):
     change = jitted(knobs, ratio + step) - jitted(knobs, ratio - step)
     yield "pressure_radius_ratio", turned, change.sum() / (2 * step)
     for field in ("ahead", "aside", "table_friction", "contact_friction"):
-        low, high = (
-            eqx.tree_at(lambda k: getattr(k, field), knobs, getattr(knobs, field) + d)
-            for d in (-step, step)
-        )
+        low, high = (_shifted(knobs, field, by) for by in (-step, step))
         change = jitted(high, ratio) - jitted(low, ratio)
         yield field, getattr(found, field), change / (2 * step)
+
+
+def _shifted(knobs: Knobs, field: str, by: float) -> Knobs:
+    return eqx.tree_at(lambda k: getattr(k, field), knobs, getattr(knobs, field) + by)
 
 
 @every_engine

@@ -137,6 +137,7 @@ def test_a_damaged_chunk_is_made_again(whole_store, tmp_path):
         path.write_text(json.dumps(receipt))
     (out / writer.ARRAYS / "truth" / "c" / "2" / "0" / "0" / "0").write_bytes(b"x")
     (out / writer.ARRAYS / "truth" / "c" / "1" / "0" / "0" / "0").unlink()
+    (out / writer.ARRAYS / "truth" / "c" / "3.0.partial").write_bytes(b"x")
     assert writer.missing_chunks(out, info) == [1, 2]
     generate(small(), out)
     assert_same_files(out, whole_store)

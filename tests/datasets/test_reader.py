@@ -1,4 +1,4 @@
-"""Batches for training: random, repeatable, of one length, and never the store whole."""
+"""Batches for training: random, repeatable, of one length, never the whole store."""
 
 from itertools import islice
 
@@ -99,7 +99,9 @@ def test_a_length_too_rare_for_a_batch_is_repeated(mixed_store, make_reader):
     reader = make_reader(mixed_store, batch_size=4)
     # An epoch: 30 // 4 batches of 12 steps, 2 of 6 steps, and one of 3 steps.
     rare = [which(b) for b in map(reader.batch, range(10)) if b[1] == 3]
-    assert [sorted(batch) for batch in rare] == [sorted([*np.flatnonzero(lengths == 3)] * 2)]
+    assert [sorted(batch) for batch in rare] == [
+        sorted([*np.flatnonzero(lengths == 3)] * 2)
+    ]
 
 
 def test_a_batch_may_be_larger_than_the_store(store, make_reader):

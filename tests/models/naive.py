@@ -173,12 +173,13 @@ def accelerations(network, local, motion, simulated_step, step: int) -> np.ndarr
     return np.array(found)
 
 
-def rollout(network, scene, state, controls, simulated, push: int) -> np.ndarray:
+def rollout(network, push_batch, simulated, push: int) -> np.ndarray:
     """The predicted motion ``[time, body, 6]`` of one push of a batch.
 
+    `push_batch` is the scenes, the initial states and the controls.
     `simulated` is s-bar after each step, ``[push, time, body, 6]``; None for IN.
     """
-    local = local_push(scene, state, controls, push)
+    local = local_push(*push_batch, push)
     motion = before = local.start
     path = []
     for step in range(len(local.action)):

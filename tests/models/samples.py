@@ -42,6 +42,12 @@ def network(model: str, kind: str, seed: int = 0) -> InteractionNetwork:
         body_deviation=drawn(0.1, 0.3, sizes.body),
         acceleration=jnp.array([3.0, 3.0, 30.0]),
     )
+    if sizes.augmented:  # how far a disk moves and turns in one step, after v_i
+        step = jnp.array([5e-4, 5e-4, 2e-2])
+        deviation = scales.body_deviation.at[3:6].set(step)
+        shown = (scales.body_mean.at[3:6].set(0), deviation)
+        where = lambda s: (s.body_mean, s.body_deviation)  # noqa: E731
+        scales = eqx.tree_at(where, scales, shown)
     key = jax.random.key(seed)
     made = InteractionNetwork(sizes, time_step=TIME_STEP, key=key, scales=scales)
     layers, larger = (lambda n: (n.rel, n.dyn)), lambda w: 1.5 * w
@@ -52,15 +58,16 @@ class Glide(AbstractEngine):
     """Disks that drift off, the heavier the slower: an engine that compiles at once."""
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
-        steps = jnp.arange(1, controls.steps + 1) * scene.time_step
+        shape = (scene.mass.shape[0], controls.steps, scene.body_count)
+        now = jnp.arange(1, controls.steps + 1) * scene.time_step
+        now = jnp.broadcast_to(now[None, :, None], shape)
         rate = jnp.stack([0.03 / scene.mass, 20 * scene.radius**2], axis=-1)
-        path = steps[:, None, None] ** 2 * rate[:, None] + initial.position[:, None]
-        velocity = 2 * steps[:, None, None] * rate[:, None]
-        angle = initial.angle[:, None] + 0.2 * jnp.sin(40 * steps)[:, None]
-        spin = jnp.broadcast_to(8 * jnp.cos(40 * steps)[:, None], angle.shape)
-        pusher = jnp.broadcast_to(
-            initial.pusher_position[:, None], (*angle.shape[:2], 2)
-        )
+        rate = jnp.broadcast_to(rate[:, None], (*shape, 2))
+        path = now[..., None] ** 2 * rate + initial.position[:, None]
+        velocity = 2 * now[..., None] * rate
+        angle = initial.angle[:, None] + 0.2 * jnp.sin(40 * now)
+        spin = 8 * jnp.cos(40 * now)
+        pusher = jnp.broadcast_to(initial.pusher_position[:, None], (*shape[:2], 2))
         return Trajectory(State(path, angle, velocity, spin, pusher, 0 * pusher))
 
 
@@ -77,7 +84,8 @@ def pushes(kind: str, bodies: int, steps: int = STEPS) -> tuple[Scene, State, Co
 def assumed(order: list[int]) -> AssumedProperties:
     """The planar engine with the paper's properties, disks in another order."""
     mass, radius = (
-        (*values, *[sum(values) / 2] * len(order)) for values in (PAPER_MASS, PAPER_RADIUS)
+        (*values, *[sum(values) / 2] * len(order))
+        for values in (PAPER_MASS, PAPER_RADIUS)
     )
     return AssumedProperties(
         engine("planar"),

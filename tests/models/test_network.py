@@ -38,15 +38,15 @@ def moving_pushes(kind: str, bodies: int, steps: int = 24):
 @every_kind
 @every_model
 def test_the_network_is_the_papers_equations(model, kind, bodies):
-    scene, initial, controls = moving_pushes(kind, bodies)
+    batch = moving_pushes(kind, bodies)
     made = quick_dynamics(model, kind)
-    found = np.asarray(pack_motion(predict(made, scene, initial, controls).states))
+    found = np.asarray(pack_motion(predict(made, *batch).states))
     simulated = None
     if model == "sain":
-        rollout = eqx.filter_jit(made.engine.rollout)(scene, initial, controls)
+        rollout = eqx.filter_jit(made.engine.rollout)(*batch)
         simulated = np.asarray(pack_motion(rollout.states), np.float64)
     for push in range(PUSHES):
-        wanted = naive.rollout(made.network, scene, initial, controls, simulated, push)
+        wanted = naive.rollout(made.network, batch, simulated, push)
         np.testing.assert_allclose(found[push], wanted, atol=2e-5)
 
 
@@ -71,16 +71,21 @@ def test_effects_and_the_simulator_matter(model, kind):
         assert moved_by(other) > 1e-5
 
 
+def with_property(scene, name, change):
+    where = lambda s: getattr(s, name)  # noqa: E731
+    return eqx.tree_at(where, scene, change(where(scene)))
+
+
 def test_a_network_is_told_masses_and_radii_but_never_a_friction():
     scene, initial, controls = pushes("robot", 2)
     made = quick_dynamics("in", "robot")
     plain = predict(made, scene, initial, controls).final.position
     for name in ("table_friction", "disk_friction", "pusher_friction"):
-        other = eqx.tree_at(lambda s: getattr(s, name), scene, getattr(scene, name) + 0.3)
+        other = with_property(scene, name, lambda value: value + 0.3)
         same = predict(made, other, initial, controls).final.position
         np.testing.assert_array_equal(same, plain)
     for name in ("mass", "radius"):
-        other = eqx.tree_at(lambda s: getattr(s, name), scene, getattr(scene, name) * 1.05)
+        other = with_property(scene, name, lambda value: 1.05 * value)
         differs = predict(made, other, initial, controls).final.position
         assert np.abs(np.asarray(differs - plain)).max() > 1e-6
 
@@ -136,10 +141,9 @@ def overlapping_push():
     return scene, state, controls
 
 
-@every_model
-def test_gradients_are_finite_over_a_whole_push_that_starts_in_overlap(model):
+def test_gradients_are_finite_over_a_whole_push_that_starts_in_overlap():
     scene, state, controls = overlapping_push()
-    made = dynamics(model, "robot", [0, 1])
+    made = dynamics("sain", "robot", [0, 1])
 
     @eqx.filter_jit
     @eqx.filter_grad

@@ -4,7 +4,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
@@ -20,9 +19,9 @@ QUIET = GenerateConfig(
 
 
 @lru_cache
-def quiet_store(factory: pytest.TempPathFactory) -> Store:
+def quiet_store(session_folder: Path) -> Store:
     """Simulated pushes without any noise, the same for a whole session."""
-    return generate(QUIET, factory.mktemp("quiet") / "store")
+    return generate(QUIET, session_folder / "quiet-store")
 
 
 def info_of(pushes: int, **changes) -> StoreInfo:

@@ -30,8 +30,9 @@ def loss_of(predicted, *target):
     return push_losses(jnp.asarray(predicted, jnp.float32), as_target(*target), WEIGHTS)
 
 
-def plain_loss(predicted, pose, rate, pose_seen, rate_seen, push):
+def plain_loss(case, push):
     """Sum over bodies and mean over the observed steps, one number at a time."""
+    predicted, pose, rate, pose_seen, rate_seen = case
     place, turn, velocity, spin = map(float, jax.tree.leaves(WEIGHTS))
     poses, rates = [], []
     for t in range(TIME):
@@ -55,7 +56,7 @@ def plain_loss(predicted, pose, rate, pose_seen, rate_seen, push):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_loss_is_the_papers(seed):
     case = random_case(seed)
-    wanted = [plain_loss(*case, push) for push in range(PUSHES)]
+    wanted = [plain_loss(case, push) for push in range(PUSHES)]
     np.testing.assert_allclose(loss_of(*case), wanted, rtol=1e-5)
 
 

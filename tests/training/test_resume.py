@@ -68,7 +68,7 @@ def kill_at(process, iteration: int):
 
 @pytest.mark.slow
 def test_a_killed_training_ends_in_the_same_bytes(tmp_path, tmp_path_factory):
-    store = quiet_store(tmp_path_factory)
+    store = quiet_store(tmp_path_factory.getbasetemp())
     calm, killed = tmp_path / "calm", tmp_path / "killed"
     undisturbed = train(store, calm)
     kill_at(train(store, killed, stop=STOP), STOP)

@@ -67,7 +67,7 @@ def test_training_predicts_with_the_papers_equations(model):
     for push in range(PUSHES):
         parts = (batch.scene, batch.initial, batch.controls)
         local = naive.local_push(*parts, push)
-        wanted = naive.rollout(net, *parts, simulated, push)
+        wanted = naive.rollout(net, parts, simulated, push)
         wanted = np.array([naive.to_local(local, motion) for motion in wanted])
         np.testing.assert_allclose(found[:, push], wanted, atol=3e-5)
         truth = np.array([naive.to_local(local, m) for m in batch.truth[push]])
@@ -223,7 +223,8 @@ def test_loss_terms_are_divided_by_what_moves(model):
     found = loss_weights(batch, config)
     motion = np.asarray(batch.truth, np.float64)
     start = np.zeros((PUSHES, 1, 2, 3))
-    start[..., :2], start[..., 2] = batch.initial.position[:, None], batch.initial.angle[:, None]
+    start[..., :2] = batch.initial.position[:, None]
+    start[..., 2] = batch.initial.angle[:, None]
     moved = motion[..., :3] - start
     squares = {
         "position": 2 / (moved[..., :2] ** 2).sum(-1).mean(),

@@ -92,7 +92,8 @@ def save_problem(path: Path, problem: Problem) -> Path:
         "clip_norm": problem.config.clip_norm,
         "l2": problem.config.l2,
     }
-    np.savez(path, **{k: np.asarray(v) for k, v in (arrays | settings).items()})
+    saved = {k: np.asarray(v) for k, v in (arrays | settings).items()}
+    np.savez(path, **saved)  # pyright: ignore[reportArgumentType]
     return path
 
 

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import threading
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
@@ -39,5 +40,20 @@ def worker_pool(workers: int | None) -> Iterator[Executor]:
     if workers is not None and workers < 1:
         raise BadInput(f"--workers is {workers}; it must be at least 1.")
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers or core_count(), mp_context=context) as pool:
+    with ProcessPoolExecutor(
+        workers or core_count(), mp_context=context, initializer=end_with_parent
+    ) as pool:
         yield pool
+
+
+def end_with_parent() -> None:
+    """End this worker when its parent dies, even of `kill -9`: nobody else would."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -56,7 +56,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         print(f"sainet: {error}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        print("sainet: interrupted; the same command goes on from here.", file=sys.stderr)
+        print(
+            "sainet: interrupted; the same command goes on from here.", file=sys.stderr
+        )
         return INTERRUPTED
     except BrokenPipeError:
         return 0

@@ -3,11 +3,15 @@
 from dataclasses import asdict, dataclass, field
 from typing import Literal, get_args
 
+from tyro.conf import Positional
+
 from sainet.engines import ENGINES
 from sainet.engines.config import NoiseConfig, NoiseLevel
 from sainet.errors import BadInput
 
 Setup = Literal["robot", "direct-force"]
+_RIGHT_ANGLE = 90  # degrees
+
 Range = tuple[float] | tuple[float, float]
 
 
@@ -18,7 +22,7 @@ class GenerateConfig:
     A range is two numbers, drawn from uniformly, or one that is always taken.
     """
 
-    setup: Setup = "robot"
+    setup: Positional[Setup] = "robot"
     """robot: the pusher follows a path. direct-force: a force drives it."""
     disks: int = 2
     """Number of disks."""
@@ -84,7 +88,7 @@ class GenerateConfig:
             _require(_finite(value) and value > 0, name, "positive", value)
         for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
             value = getattr(self, name)
-            _require(0 <= value < 90, name, "from 0 to below 90", value)
+            _require(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
         _require(
             _finite(self.gap_mm) and self.gap_mm >= 0,
             "gap-mm",

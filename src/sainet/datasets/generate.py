@@ -45,7 +45,9 @@ def generate(
         RunConflict: the folder holds something else.
         BadInput: the disk is full.
     """
-    folder = open_run(out, {"command": "generate", **asdict(config)}, finished_by=HASHES)
+    folder = open_run(
+        out, {"command": "generate", **asdict(config)}, finished_by=HASHES
+    )
     if folder.is_finished:
         _log.info("%s is finished already", out)
         clear_progress(out)

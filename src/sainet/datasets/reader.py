@@ -20,7 +20,9 @@ class ChunkCache:
     store: Store
     names: tuple[str, ...]
     limit: int  # bytes
-    _chunks: OrderedDict[int, dict[str, np.ndarray]] = field(default_factory=OrderedDict)
+    _chunks: OrderedDict[int, dict[str, np.ndarray]] = field(
+        default_factory=OrderedDict
+    )
     _size: int = 0
 
     def get(self, index: int) -> dict[str, np.ndarray]:
@@ -43,7 +45,9 @@ class ChunkCache:
             rows = pushes[here] - owner * self.store.info.chunk_size
             for name, array in self.get(int(owner)).items():
                 shape = (len(pushes), *array.shape[1:])
-                picked.setdefault(name, np.empty(shape, array.dtype))[here] = array[rows]
+                picked.setdefault(name, np.empty(shape, array.dtype))[here] = array[
+                    rows
+                ]
         return picked
 
 

@@ -152,7 +152,9 @@ def _with_friction_field(
     if not noise.friction_fraction:
         return scene
     features = friction_features(rng, len(scene.table_friction), noise)
-    field = FrictionField(**{k: jnp.asarray(v, jnp.float32) for k, v in features.items()})
+    field = FrictionField(
+        **{k: jnp.asarray(v, jnp.float32) for k, v in features.items()}
+    )
     return eqx.tree_at(
         lambda s: s.friction_field, scene, field, is_leaf=lambda x: x is None
     )

@@ -90,7 +90,7 @@ def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
     A chunk counts as written when its receipt is there and its files are what the
     receipt says. What an interrupted writer left half-done is removed.
     """
-    for leftover in folder.rglob("*.partial"):
+    for leftover in (folder / ARRAYS).rglob("*.partial"):
         leftover.unlink(missing_ok=True)
     return [i for i in range(info.chunks) if not _is_written(folder, i)]
 

@@ -118,7 +118,9 @@ def evaluate(
     """
     names = [model.name for model in models]
     if len(set(names)) < len(names):
-        raise BadInput(f"--model: {', '.join(names)} are not all different; rename one.")
+        raise BadInput(
+            f"--model: {', '.join(names)} are not all different; rename one."
+        )
     for model in models:
         if not force:
             model.check_fits(store.info.kind, store.info.time_step)
@@ -206,9 +208,7 @@ def _predict_pose(
     return jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
 
 
-def _join(
-    errors: list[PushErrors], parts: list[tuple[np.ndarray, int]]
-) -> PushErrors:
+def _join(errors: list[PushErrors], parts: list[tuple[np.ndarray, int]]) -> PushErrors:
     """Put the errors of all parts back into the order of the store."""
     order = np.argsort(np.concatenate([part for part, _ in parts]))
     stacked = {
@@ -239,5 +239,3 @@ def _evaluation(
         groups=tuple(names[code] if names else None for code in arrays["group"]),
         reference=REFERENCE_DISTANCE["recorded" if recorded else "simulated"],
     )
-
-

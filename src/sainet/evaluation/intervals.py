@@ -36,11 +36,13 @@ def difference_interval(
 
 
 def _bootstrap(samples: tuple, statistic) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
-    if len(samples[0]) < 2:  # noqa: PLR2004
-        unknown = np.full(samples[0].shape[1], np.nan)
-        return unknown, unknown
+    """Return the ends of the intervals; NaN where a value is not known."""
+    low, high = np.full((2, samples[0].shape[1]), np.nan)
+    known = np.all([np.isfinite(sample).all(axis=0) for sample in samples], axis=0)
+    if len(samples[0]) < 2 or not known.any():  # noqa: PLR2004
+        return low, high
     result = bootstrap(
-        samples,
+        tuple(sample[:, known] for sample in samples),
         statistic,
         axis=0,
         paired=len(samples) > 1,
@@ -50,4 +52,6 @@ def _bootstrap(samples: tuple, statistic) -> tuple[np.ndarray, np.ndarray]:  # n
         method="percentile",
         rng=np.random.default_rng(_SEED),
     )
-    return result.confidence_interval.low, result.confidence_interval.high
+    low[known] = result.confidence_interval.low
+    high[known] = result.confidence_interval.high
+    return low, high

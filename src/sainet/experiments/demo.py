@@ -82,7 +82,9 @@ def _simulate_and_train(chain: Chain, config: DemoConfig) -> Store:
     test = chain.simulate(
         "test", GenerateConfig(pushes=config.test_pushes, seed=config.seed + 1)
     )
-    chain.say("[bold]2[/] Training the network alone (IN), then around the engine (SAIN).")
+    chain.say(
+        "[bold]2[/] Training the network alone (IN), then around the engine (SAIN)."
+    )
     quarter = max(config.iterations // 4, 1)
     recipe = FitConfig(
         iterations=config.iterations,

@@ -10,7 +10,9 @@ ROBOT_TWO_DISKS = {
 }
 
 
-def published_rows(table: dict[str, dict[str, tuple[float, ...]]]) -> list[dict[str, Any]]:
+def published_rows(
+    table: dict[str, dict[str, tuple[float, ...]]],
+) -> list[dict[str, Any]]:
     """Return a published table as rows like those of our own."""
     return [
         {

@@ -27,7 +27,9 @@ def build_replay(
     """
     arrays = store.read(slice(push, push + 1))
     batch = to_batch(arrays, store.info, steps=steps)
-    pusher = _with_start(batch.initial.pusher_position, arrays["truth_pusher"][:, :steps])
+    pusher = _with_start(
+        batch.initial.pusher_position, arrays["truth_pusher"][:, :steps]
+    )
     motion = _with_start(_pose(batch.initial), np.asarray(batch.truth[..., :3]))
     tracks = {"truth": Track(motion[..., :2], motion[..., 2], pusher)}
     for model in models:

@@ -78,5 +78,5 @@ def _require(path: Path, name: str, value: object, check: _Check) -> None:
     good, wanted = check
     if not good(value):
         raise BadCheckpoint(
-            f"{path}: {name} is {value!r}; it must be {wanted}. Train the network again."
+            f"{path}: {name} is {value!r}; it must be {wanted}. Train it again."
         )

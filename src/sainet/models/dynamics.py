@@ -80,7 +80,7 @@ class LearnedDynamics(AbstractDynamics):
         self, scene: Scene, carry: LearnedCarry, controls: Controls
     ) -> tuple[LearnedCarry, Trajectory]:
         """Apply the network recurrently."""
-        trajectory = _correct(self.network, scene, carry, controls, None, None)
+        trajectory = _correct(self.network, scene, carry, controls)
         return LearnedCarry(trajectory.final, carry.frame), trajectory
 
 
@@ -112,7 +112,14 @@ class SimulatorAugmented(AbstractDynamics):
         simulated = self.engine.rollout(scene, carry.simulated, controls)
         learned = LearnedCarry(carry.predicted, carry.frame)
         start, s_bar = pack_motion(carry.simulated), pack_motion(simulated.states)
-        trajectory = _correct(self.network, scene, learned, controls, start, s_bar)
+        trajectory = _correct(
+            self.network,
+            scene,
+            learned,
+            controls,
+            simulated_start=start,
+            simulated=s_bar,
+        )
         return HybridCarry(simulated.final, trajectory.final, carry.frame), trajectory
 
 
@@ -121,8 +128,9 @@ def predict_motion(
     scene: Scene,
     carry: LearnedCarry,
     controls: Controls,
-    simulated_start: Float[Array, "push body 6"] | None,
-    simulated: Float[Array, "push time body 6"] | None,
+    *,
+    simulated_start: Float[Array, "push body 6"] | None = None,
+    simulated: Float[Array, "push time body 6"] | None = None,
 ) -> Float[Array, "time push body 6"]:
     """Unroll a network in the push frame; the result stays in that frame.
 
@@ -137,7 +145,9 @@ def predict_motion(
     frame = carry.frame
     start = motion_to_frame(pack_motion(carry.predicted), frame)
     local = None if simulated is None else _path_to_frame(simulated, frame)
-    before = start if simulated_start is None else motion_to_frame(simulated_start, frame)
+    before = (
+        start if simulated_start is None else motion_to_frame(simulated_start, frame)
+    )
     drive = drives(controls_to_frame(controls, frame), before, local)
     return unroll(network, start, still_features(scene, frame.pushed), drive)
 
@@ -151,10 +161,18 @@ def _correct(
     scene: Scene,
     carry: LearnedCarry,
     controls: Controls,
-    simulated_start: Array | None,
-    simulated: Array | None,
+    *,
+    simulated_start: Array | None = None,
+    simulated: Array | None = None,
 ) -> Trajectory:
-    local = predict_motion(network, scene, carry, controls, simulated_start, simulated)
+    local = predict_motion(
+        network,
+        scene,
+        carry,
+        controls,
+        simulated_start=simulated_start,
+        simulated=simulated,
+    )
     motion = jax.vmap(motion_from_frame, in_axes=(0, None), out_axes=1)(
         local, carry.frame
     )

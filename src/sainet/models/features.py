@@ -105,9 +105,7 @@ def body_features(
     )
 
 
-def still_features(
-    scene: Scene, pushed: Float[Array, "*batch body"]
-) -> Still:
+def still_features(scene: Scene, pushed: Float[Array, "*batch body"]) -> Still:
     """Return what stays the same: the true mass and radius, never a friction."""
     return Still(scene.mass, scene.radius, pushed, scene.pusher_radius)
 
@@ -136,6 +134,8 @@ def drives(
 def _action(controls: Controls) -> tuple[Array, Array]:
     if isinstance(controls, PathControls):
         return controls.velocity, controls.position
-    offset = jnp.broadcast_to(controls.contact_offset[..., None, :], controls.force.shape)
+    offset = jnp.broadcast_to(
+        controls.contact_offset[..., None, :], controls.force.shape
+    )
     action = jnp.concatenate([controls.force, offset], axis=-1)
     return action, jnp.zeros((*action.shape[:-1], 0))

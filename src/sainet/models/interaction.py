@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float, PRNGKeyArray
 
+from sainet.models.bounded import bound_gradient
 from sainet.models.features import (
     Drive,
     FeatureSizes,
@@ -104,7 +105,9 @@ class InteractionNetwork(eqx.Module):
         """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 6 and 10)."""
         effect = self._effects(motion, still, drive)
         features = body_features(motion, still, drive)
-        shown = _standardise(features, self.scales.body_mean, self.scales.body_deviation)
+        shown = _standardise(
+            features, self.scales.body_mean, self.scales.body_deviation
+        )
         out = self.dyn(jnp.concatenate([shown, effect], axis=-1))
         return out * jnp.broadcast_to(self.scales.acceleration, out.shape)
 
@@ -115,7 +118,9 @@ class InteractionNetwork(eqx.Module):
         if motion.shape[0] == 1:
             return jnp.zeros((1, EFFECT), motion.dtype)
         features = pair_features(motion, still, drive)
-        shown = _standardise(features, self.scales.pair_mean, self.scales.pair_deviation)
+        shown = _standardise(
+            features, self.scales.pair_mean, self.scales.pair_deviation
+        )
         return jnp.sum(self.rel(shown), axis=0)
 
     def step(
@@ -169,7 +174,7 @@ def unroll(
 
     @jax.checkpoint
     def body(motion: Array, now: Drive) -> tuple[Array, Array]:
-        motion = step(motion, still, now)
+        motion = step(bound_gradient(motion), still, now)
         return motion, motion
 
     time_first = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)

@@ -20,7 +20,12 @@ def predict_batch(
     start = pack_motion(batch.initial) if network.sizes.augmented else None
     simulated = batch.simulated if network.sizes.augmented else None
     return predict_motion(
-        network, batch.scene, carry, batch.controls, start, simulated
+        network,
+        batch.scene,
+        carry,
+        batch.controls,
+        simulated_start=start,
+        simulated=simulated,
     )
 
 

@@ -1,4 +1,4 @@
-"""The training loop: resumes after any interruption to the same weights, bit for bit."""
+"""The training loop: resumes after any interruption to the same weights."""
 
 import logging
 import warnings
@@ -9,16 +9,15 @@ from typing import Any
 
 import jax
 import numpy as np
+from jax.sharding import NamedSharding, PartitionSpec
 
-from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.reader import BatchReader
-from sainet.datasets.schema import simulated_name, variables
 from sainet.datasets.store import Store
+from sainet.devices import batch_mesh
 from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
-from sainet.errors import BadInput, BadStore, Diverged
+from sainet.errors import Diverged
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
-from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork
 from sainet.runs import (
     MANIFEST,
@@ -32,11 +31,10 @@ from sainet.runs import (
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.log import append_log, read_log, rewind_log
 from sainet.training.loss import LossWeights
-from sainet.training.statistics import feature_scales, loss_weights
-from sainet.training.step import FitState, data_loss, even_batch, first_state, make_step
+from sainet.training.step import FitState, data_loss, even_batch, make_step
+from sainet.training.task import Task, begin, check_data, settings
 
 STATE = "state.safetensors"
-_STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
 _log = logging.getLogger(__name__)
 
 
@@ -46,43 +44,6 @@ class FitResult:
 
     folder: Path
     history: list[dict[str, Any]]
-
-
-@dataclass(frozen=True)
-class Task:
-    """What is trained on what."""
-
-    model: ModelKind
-    store: Store
-    config: FitConfig
-    assumed_engine: str
-
-    @property
-    def simulated(self) -> str | None:
-        """The assumed engine whose prediction the network sees."""
-        return self.assumed_engine if self.model == "sain" else None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The arrays of the store that training reads."""
-        unread = ("truth_pusher", "group", "published")
-        skip = lambda name: name.startswith(("simulated_", *unread))  # noqa: E731
-        kept = [name for name in variables(self.store.info) if not skip(name)]
-        return (*kept, simulated_name(self.assumed_engine))
-
-    @property
-    def training_pushes(self) -> int:
-        """How many of the store's first pushes are trained on."""
-        return self.store.info.pushes - self.config.validation_pushes
-
-    def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
-        """Turn stored arrays into a batch with what the network sees."""
-        return to_batch(
-            arrays,
-            self.store.info,
-            steps=min(steps, self.config.steps),
-            simulated=self.simulated,
-        )
 
 
 def fit(
@@ -110,44 +71,22 @@ def fit(
         Diverged: the loss left the finite numbers for good.
     """
     task = Task(model, store, config, assumed_engine)
-    _check_data(task)
+    check_data(task)
     devices = jax.device_count()
-    folder = open_run(out, _settings(task), finished_by=CARD, devices=devices)
+    folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
     if folder.is_finished:
         _log.info("%s is finished already", out)
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
-    state, weights = _begin(task)
+    state, weights = begin(task)
     if (out / STATE).is_file():
         state = load_arrays(out / STATE, state)
     history = rewind_log(out, int(state.iteration))
-    state = _iterate(task, state, weights, out, history, on_step)
+    # Where the step leaves it: otherwise its first call compiles a second time.
+    state = jax.device_put(state, NamedSharding(batch_mesh(), PartitionSpec()))
+    state = _iterate(task, state, weights, out=out, history=history, on_step=on_step)
     _finish(task, state.network, folder, history)
     return FitResult(out, history)
-
-
-def _check_data(task: Task) -> None:
-    info, path = task.store.info, task.store.path
-    if task.assumed_engine not in info.assumed_engines:
-        raise BadStore(
-            f"{path}: assumed_engines has no {task.assumed_engine!r}; generate the data "
-            f"with --assumed-engine {task.assumed_engine}."
-        )
-    if task.training_pushes < 1:
-        raise BadInput(
-            f"--validation-pushes is {task.config.validation_pushes}; {path} has only "
-            f"{info.pushes} pushes."
-        )
-
-
-def _settings(task: Task) -> dict[str, Any]:
-    return {
-        "command": "train",
-        "model": task.model,
-        "assumed_engine": task.assumed_engine,
-        "data": task.store.content,
-        **asdict(task.config),
-    }
 
 
 def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
@@ -161,24 +100,11 @@ def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
             )
 
 
-def _begin(task: Task) -> tuple[FitState, LossWeights]:
-    info = task.store.info
-    few = slice(0, min(_STATISTICS_PUSHES, task.training_pushes))
-    sample = task.to_batch(task.store.read(few, task.names), info.steps)
-    sizes = FeatureSizes(info.kind, task.model == "sain")
-    network = InteractionNetwork(
-        sizes,
-        time_step=info.time_step,
-        key=jax.random.key(task.config.seed),
-        scales=feature_scales(sample, sizes),
-    )
-    return first_state(network, task.config), loss_weights(sample, task.config)
-
-
 def _iterate(
     task: Task,
     state: FitState,
     weights: LossWeights,
+    *,
     out: Path,
     history: list[dict[str, Any]],
     on_step: Callable[[int, float], None],

@@ -1,4 +1,4 @@
-"""The log of a training: one JSON line every few iterations, the same after a resume."""
+"""The log of a training: JSON lines, the same after a resume."""
 
 import json
 from pathlib import Path

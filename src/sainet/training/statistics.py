@@ -20,6 +20,7 @@ from sainet.training.batch import path_to_frame
 from sainet.training.config import FitConfig
 from sainet.training.loss import LossWeights
 
+_CONSTANT = 1e-9  # a deviation below this is that of a feature that never varies
 _STILL = 1e-14  # a mean square (m^2, say) below this is rounding
 
 
@@ -59,7 +60,7 @@ def _spread(features: Array) -> tuple[Array, Array]:
     rows = features.reshape(-1, features.shape[-1])
     deviation = jnp.std(rows, axis=0)
     # A feature that never varies, a fixed mass say, must not be divided by zero.
-    return jnp.mean(rows, axis=0), jnp.where(deviation > 1e-9, deviation, 1.0)
+    return jnp.mean(rows, axis=0), jnp.where(deviation > _CONSTANT, deviation, 1.0)
 
 
 @eqx.filter_jit

@@ -35,7 +35,9 @@ def make_optimizer(config: FitConfig) -> optax.GradientTransformation:
     schedule = optax.exponential_decay(
         config.learning_rate, config.halve_every, 0.5, staircase=True
     )
-    chain = optax.chain(optax.clip_by_global_norm(config.clip_norm), optax.adam(schedule))
+    chain = optax.chain(
+        optax.clip_by_global_norm(config.clip_norm), optax.adam(schedule)
+    )
     return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
 
 
@@ -102,7 +104,9 @@ def make_step(
         )
         updates, moments = optimizer.update(mean, state.optimizer, layers)
         network = with_layers(state.network, optax.apply_updates(layers, updates))  # pyright: ignore
-        return FitState(network, moments, state.iteration + 1), total / config.batch_size
+        return FitState(
+            network, moments, state.iteration + 1
+        ), total / config.batch_size
 
     return step
 
@@ -121,4 +125,3 @@ def even_batch(batch: PushBatch) -> PushBatch:
         padded,
         (padded.pose_observed & real[:, None], padded.rate_observed & real[:, None]),
     )
-

@@ -32,7 +32,8 @@ class _Pairs(NamedTuple):
 def contact_budget(body_count: int) -> int:
     """Return how many pairs of bodies (the pusher included) can touch at once."""
     every = body_count * (body_count - 1) // 2
-    return every if body_count < 3 else min(every, 3 * body_count - 6)
+    # A graph of two bodies has one edge, where the formula says none.
+    return min(every, max(3 * body_count - 6, 1))
 
 
 def solve_close_pairs(

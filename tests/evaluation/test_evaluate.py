@@ -1,0 +1,205 @@
+"""Whole evaluations of small stores."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from models.samples import quick_dynamics
+from sainet.engines import make_engine
+from sainet.engines.assumed import AssumedProperties
+from sainet.errors import BadCheckpoint, BadInput
+from sainet.evaluation.evaluate import evaluate
+from sainet.models.card import Card
+from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics
+from sainet.models.registry import NamedDynamics
+from sainet.scene import State, Trajectory
+from training.stores import end_points_alone, info_of, made_up, quiet_store, write
+
+PUSHES = 11
+LENGTHS = np.array([12, 5, 12, 8, 5, 12, 8, 8, 12, 5, 12])
+
+
+class Rest(AbstractDynamics):
+    """Predicts that nothing moves, but for a shift (m) along x."""
+
+    shift: jax.Array
+
+    def begin(self, scene, state):
+        return state
+
+    def advance(self, scene, carry, controls):
+        def repeat(x):
+            return jnp.repeat(x[:, None], controls.steps, axis=1)
+
+        states: State = jax.tree.map(repeat, carry)
+        place = states.position.at[..., 0].add(self.shift)
+        states = eqx.tree_at(lambda s: s.position, states, place)
+        return carry, Trajectory(states)
+
+
+def resting(name="rest", shift=0.0, card=None):
+    return NamedDynamics(name, Rest(jnp.float32(shift)), card)
+
+
+@pytest.fixture(scope="session")
+def simulated(tmp_path_factory):
+    """Made-up pushes of three lengths in two groups."""
+    info = info_of(PUSHES, groups=("rough", "even"))
+    arrays = made_up(info, LENGTHS)
+    arrays["group"] = np.arange(PUSHES) % 2
+    return write(tmp_path_factory.mktemp("simulated"), info, arrays)
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory):
+    """Pushes of which the ends are known, beside a published model's prediction."""
+    info = info_of(
+        PUSHES, bodies=1, engine="recorded", seed=None, published=("convex",)
+    )
+    arrays = made_up(info, LENGTHS)
+    last = arrays["truth"][np.arange(PUSHES), LENGTHS - 1, :, :3]
+    arrays["published_convex"] = last + np.array([0.0, 0.002, np.deg2rad(3)])
+    arrays = end_points_alone(arrays)
+    return write(tmp_path_factory.mktemp("recorded"), info, arrays)
+
+
+def errors_at_rest(store, limit, shift=0.0):
+    """What `Rest` gets wrong, push by push in the order of the store."""
+    arrays = store.read(slice(None))
+    means, finals, ways = [], [], []
+    for push in range(store.info.pushes):
+        steps = min(LENGTHS[push], limit)
+        start = arrays["initial"][push, :, :2].astype(float)
+        true = arrays["truth"][push, :steps, :, :2].astype(float)
+        gap = 1000 * np.linalg.norm(start + [shift, 0] - true, axis=-1)
+        means.append(gap.mean(0))
+        finals.append(gap[-1])
+        ways.append(1000 * np.linalg.norm(true[-1] - start, axis=-1))
+    return np.array(means), np.array(finals), np.array(ways)
+
+
+@pytest.mark.parametrize(("steps", "limit"), [(None, 12), (0, 12), (12, 12), (6, 6)])
+def test_pushes_of_mixed_length_come_back_in_the_order_of_the_store(
+    simulated, steps, limit
+):
+    told = []
+    found = evaluate(
+        [resting(shift=0.001)],
+        simulated,
+        steps=steps,
+        on_pushes=lambda *a: told.append(a),
+    )
+    mean, final, way = errors_at_rest(simulated, limit, 0.001)
+    np.testing.assert_allclose(found.errors["rest"].pos_mm, mean, rtol=1e-3)
+    np.testing.assert_allclose(found.errors["rest"].final_pos_mm, final, rtol=1e-3)
+    np.testing.assert_allclose(found.travel_mm, way, rtol=1e-3)
+    assert sum(pushes for _, pushes in told) == PUSHES
+
+
+def test_groups_are_averaged_apart(simulated):
+    found = evaluate([resting()], simulated)
+    mean, _, _ = errors_at_rest(simulated, 12)
+    rows = found.to_dict()["rows"]
+    assert [(r["group"], r["body"]) for r in rows] == [
+        ("even", 1),
+        ("even", 2),
+        ("rough", 1),
+        ("rough", 2),
+    ]
+    for row in rows:
+        part = mean[("rough", "even").index(row["group"]) :: 2, row["body"] - 1]
+        assert (row["n"], row["pos_mm"]) == (
+            len(part),
+            pytest.approx(part.mean(), rel=1e-3),
+        )
+        assert row["trans_percent"] == pytest.approx(row["pos_mm"] / 2.5)
+
+
+def test_models_are_compared_pair_by_pair(simulated):
+    models = [resting(), resting("same"), resting("shifted", 0.02)]
+    rows = evaluate(models, simulated).to_dict()["comparisons"]
+    pairs = [("same", "rest"), ("shifted", "rest"), ("shifted", "same")]
+    found = dict.fromkeys((row["model"], row["against"]) for row in rows)
+    assert list(found) == pairs
+    for row in rows:
+        if row["model"] == "same":
+            assert (row["difference"], row["interval"]) == (0, [0, 0])
+        elif row["metric"] == "pos_mm":
+            assert row["difference"] > 5
+            assert row["interval"][0] > 0
+
+
+def test_recorded_pushes_have_final_errors_beside_published_ones(recorded):
+    found = evaluate([resting()], recorded)
+    (row,) = found.to_dict()["rows"]
+    _, final, _ = errors_at_rest(recorded, 12)
+    assert row["final_pos_mm"] == pytest.approx(final.mean(), rel=1e-3)
+    assert row["group"] is None
+    assert row["trans_percent"] == pytest.approx(row["pos_mm"] / 3.45)
+    (published,) = found.to_dict()["published"]
+    assert published["model"] == "convex"
+    assert published["final_pos_mm"] == pytest.approx(2, rel=1e-3)
+    assert published["final_rot_deg"] == pytest.approx(3, rel=1e-3)
+    assert published["pos_mm"] is None
+    assert not [name for name in published if name.endswith("_interval")]
+
+
+def test_what_was_not_seen_within_the_steps_is_unknown_not_zero(recorded):
+    found = evaluate([resting()], recorded, steps=8)
+    known = np.isfinite(found.errors["rest"].final_pos_mm[:, 0])
+    np.testing.assert_array_equal(known, LENGTHS <= 8)
+
+
+def test_physics_that_knows_everything_makes_no_error(tmp_path_factory):
+    store = quiet_store(tmp_path_factory.getbasetemp())
+    knowing = AssumedProperties(
+        make_engine("planar"), mass=None, radius=None, friction=None
+    )
+    models = [
+        NamedDynamics("truth", PhysicsDynamics(knowing)),
+        NamedDynamics(
+            "physics", PhysicsDynamics(AssumedProperties(make_engine("planar")))
+        ),
+    ]
+    errors = evaluate(models, store).errors
+    for name, tolerance in (("pos_mm", 1e-3), ("rot_deg", 1e-3)):
+        assert getattr(errors["truth"], name).max() < tolerance
+        assert getattr(errors["physics"], name).mean() > 100 * tolerance
+
+
+def test_a_network_is_not_used_on_other_pushes_unless_forced(simulated):
+    card = Card(
+        model="in",
+        kind="direct-force",
+        time_step=1 / 240,
+        inner_engine=None,
+        truth_engine="planar",
+        assumed=None,
+        data="",
+        data_seed=0,
+        weights="",
+        config={},
+        manifest={},
+    )
+    with pytest.raises(BadCheckpoint, match="kind is 'direct-force'"):
+        evaluate([resting(card=card)], simulated)
+    evaluate([resting(card=card)], simulated, force=True)
+
+
+def test_a_network_can_be_evaluated(simulated):
+    model = NamedDynamics("in", quick_dynamics("in", "robot"))
+    (row, *_) = evaluate([model], simulated, steps=5).to_dict()["rows"]
+    assert row["pos_mm"] > 0
+
+
+def test_two_models_of_one_name_are_refused(simulated):
+    with pytest.raises(BadInput, match="rest, rest are not all different"):
+        evaluate([resting(), resting()], simulated)
+
+
+@pytest.mark.parametrize("steps", [-1, 13])
+def test_steps_that_the_pushes_do_not_have_are_refused(simulated, steps):
+    with pytest.raises(BadInput, match=f"--steps is {steps}; .* has 12"):
+        evaluate([resting()], simulated, steps=steps)

@@ -1,0 +1,211 @@
+"""Errors and their intervals against plain loops and cases that a hand can check."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from sainet.evaluation.intervals import (
+    difference_interval,
+    mean_interval,
+    ratio_interval,
+)
+from sainet.evaluation.metrics import (
+    PushErrors,
+    final_errors,
+    final_pose,
+    push_errors,
+    travel_mm,
+)
+from sainet.evaluation.rows import METRICS, comparison_rows, error_rows
+
+PUSHES, STEPS, BODIES = 6, 9, 2
+
+
+@pytest.fixture
+def poses():
+    rng = np.random.default_rng(0)
+    true, predicted = rng.normal(0, 2, (2, PUSHES, STEPS, BODIES, 3))
+    observed = rng.random((PUSHES, STEPS)) < 0.6
+    observed[:, 2] = True
+    return predicted, true, observed
+
+
+def turn_between(one: float, other: float) -> float:
+    """The smaller angle between two directions (degrees)."""
+    cosine = np.cos(one) * np.cos(other) + np.sin(one) * np.sin(other)
+    return float(np.rad2deg(np.arccos(np.clip(cosine, -1, 1))))
+
+
+def test_errors_are_those_of_plain_loops(poses):
+    predicted, true, observed = poses
+    found = push_errors(
+        predicted, np.where(observed[..., None, None], true, np.nan), observed
+    )
+    for push in range(PUSHES):
+        for body in range(BODIES):
+            places, turns = [], []
+            for step in range(STEPS):
+                if observed[push, step]:
+                    p, t = predicted[push, step, body], true[push, step, body]
+                    places.append(1000 * np.hypot(p[0] - t[0], p[1] - t[1]))
+                    turns.append(turn_between(p[2], t[2]))
+            wanted = (np.mean(places), np.mean(turns), places[-1], turns[-1])
+            for metric, value in zip(METRICS, wanted, strict=True):
+                assert getattr(found, metric)[push, body] == pytest.approx(
+                    value, rel=1e-6
+                )
+
+
+@pytest.mark.parametrize(
+    ("shift", "name", "wanted"),
+    [
+        ((0.001, 0, 0), "pos_mm", 1),
+        ((-0.003, 0.004, 0), "pos_mm", 5),
+        ((0, 0, np.deg2rad(2)), "rot_deg", 2),
+        ((0, 0, np.deg2rad(-358)), "rot_deg", 2),
+        ((0, 0, np.pi), "rot_deg", 180),
+        ((0, 0, 6 * np.pi), "rot_deg", 0),
+    ],
+)
+def test_a_shift_or_a_turn_is_the_error(poses, shift, name, wanted):
+    _, true, observed = poses
+    errors = push_errors(true + np.array(shift), true, observed)
+    other = "rot_deg" if name == "pos_mm" else "pos_mm"
+    for prefix in ("", "final_"):
+        np.testing.assert_allclose(getattr(errors, prefix + name), wanted, atol=1e-6)
+        np.testing.assert_allclose(getattr(errors, prefix + other), 0, atol=1e-6)
+
+
+def test_either_side_of_half_a_turn_is_near():
+    predicted, true = np.zeros((2, 1, 1, 1, 3))
+    predicted[..., 2], true[..., 2] = np.deg2rad(179), np.deg2rad(-181 + 360 + 2)
+    errors = push_errors(predicted, true, np.ones((1, 1), bool))
+    assert errors.rot_deg[0, 0] == pytest.approx(2)
+    true[..., 2] = np.deg2rad(-179)
+    errors = push_errors(predicted, true, np.ones((1, 1), bool))
+    assert errors.rot_deg[0, 0] == pytest.approx(2)
+
+
+def test_a_push_that_nobody_saw_has_unknown_errors(poses):
+    predicted, true, observed = poses
+    observed[3] = False
+    errors = push_errors(predicted, np.full_like(true, np.nan), observed)
+    for field in fields(errors):
+        known = np.isfinite(getattr(errors, field.name))
+        assert not known[3].any()
+    ends = final_pose(true, observed)
+    assert np.isnan(ends[3]).all()
+    assert np.isfinite(np.delete(ends, 3, axis=0)).all()
+
+
+def test_final_poses_are_the_last_that_were_seen(poses):
+    _, true, observed = poses
+    for push, pose in enumerate(final_pose(true, observed)):
+        last = max(np.flatnonzero(observed[push]))
+        np.testing.assert_array_equal(pose, true[push, last])
+
+
+def test_errors_of_final_poses_alone(poses):
+    true = poses[1][:, 0]
+    errors = final_errors(true + np.array([0.0, 0.002, np.deg2rad(3)]), true)
+    np.testing.assert_allclose(errors.final_pos_mm, 2)
+    np.testing.assert_allclose(errors.final_rot_deg, 3)
+    assert np.isnan(errors.pos_mm).all()
+    assert np.isnan(errors.rot_deg).all()
+
+
+def test_travel_is_the_way_between_the_ends():
+    start = np.array([[[1.0, 2.0, 0.0]]])
+    end = np.array([[[1.003, 2.004, 9.0]]])
+    np.testing.assert_allclose(travel_mm(start, end), [[5.0]])
+
+
+def errors_of(values) -> PushErrors:
+    return PushErrors(*(values * factor for factor in (1, 2, 3, 4)))
+
+
+@pytest.mark.parametrize("reference", [0.25, 0.345])
+def test_rows_hold_means_and_percentages(reference):
+    values = np.array([[1.0, 2.0], [3.0, 6.0]])
+    travel = np.array([[10.0, 5.0], [30.0, 11.0]])
+    rows = error_rows("m", errors_of(values), travel, group="g", reference=reference)
+    assert [(r["model"], r["body"], r["group"], r["n"]) for r in rows] == [
+        ("m", 1, "g", 2),
+        ("m", 2, "g", 2),
+    ]
+    for row, mean, way in zip(rows, (2.0, 4.0), (20.0, 8.0), strict=True):
+        for factor, name in enumerate(METRICS, start=1):
+            assert row[name] == pytest.approx(factor * mean)
+        assert row["trans_percent"] == pytest.approx(100 * mean / (1000 * reference))
+        assert row["relative_percent"] == pytest.approx(100 * 3 * mean / way)
+        for name in (*METRICS, "trans_percent", "relative_percent"):
+            low, high = row[name + "_interval"]
+            assert low <= row[name] <= high
+
+
+def test_rows_of_one_push_have_no_interval_and_unknown_is_none():
+    unknown = np.full((1, 1), np.nan)
+    errors = PushErrors(unknown, unknown, np.ones((1, 1)), np.ones((1, 1)))
+    (row,) = error_rows("m", errors, np.ones((1, 1)), group=None, reference=0.25)
+    assert row["pos_mm"] is None
+    assert row["final_pos_mm"] == 1
+    assert row["final_pos_mm_interval"] == [None, None]
+
+
+# Intervals.
+
+
+def test_intervals_cover_the_mean_about_95_times_in_100():
+    rng = np.random.default_rng(1)
+    values = rng.normal(3, 2, (80, 300))  # 300 experiments of 80 pushes
+    mean, low, high = mean_interval(values)
+    np.testing.assert_allclose(mean, values.mean(0))
+    covered = ((low < 3) & (high > 3)).mean()
+    assert 0.9 < covered < 0.98
+    # A normal mean's interval: 1.96 standard errors to either side.
+    np.testing.assert_allclose(
+        (high - low).mean(), 2 * 1.96 * 2 / np.sqrt(80), rtol=0.05
+    )
+
+
+def test_intervals_are_the_same_every_time():
+    values = np.random.default_rng(2).normal(size=(20, 3))
+    for one, other in zip(mean_interval(values), mean_interval(values), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_what_is_not_known_has_no_interval_and_leaves_the_others_theirs():
+    values = np.random.default_rng(2).normal(size=(20, 3))
+    whole = mean_interval(values)
+    values[4, 1] = np.nan
+    for one, other in zip(mean_interval(values), whole, strict=True):
+        assert np.isnan(one[1])
+        np.testing.assert_array_equal(one[[0, 2]], other[[0, 2]])
+
+
+def test_a_ratio_is_that_of_the_means_of_the_same_pushes():
+    rng = np.random.default_rng(3)
+    below = rng.uniform(1, 9, (60, 1))
+    found = ratio_interval(0.3 * below, below)
+    np.testing.assert_allclose(found, 0.3)  # pairs stay together, so it never varies
+    ratio, low, high = ratio_interval(rng.uniform(1, 2, (60, 1)), below)
+    assert low < ratio < high
+
+
+def test_differences_are_paired():
+    rng = np.random.default_rng(4)
+    hard = rng.uniform(0, 100, (40, 1))  # some pushes are hard for every model
+    better = hard - 1 + rng.normal(0, 0.1, hard.shape)
+    difference, low, high = difference_interval(better, hard)
+    assert difference[0] == pytest.approx(-1, abs=0.1)
+    assert -1.2 < low[0] < high[0] < -0.8
+
+
+def test_a_model_against_itself_differs_by_nothing():
+    errors = errors_of(np.random.default_rng(5).uniform(size=(10, 2)))
+    rows = comparison_rows(("a", errors), ("b", errors), group=None)
+    assert len(rows) == 2 * len(METRICS)
+    for row in rows:
+        assert (row["difference"], row["interval"]) == (0, [0, 0])
+        assert (row["model"], row["against"]) == ("a", "b")
