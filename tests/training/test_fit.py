@@ -178,7 +178,7 @@ def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch
 def started(store, folder, monkeypatch):
     """A run that was stopped before its first step."""
 
-    def stop(*args):
+    def stop(*args, **settings):
         raise Stopped
 
     with monkeypatch.context() as patch:

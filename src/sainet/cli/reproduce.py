@@ -44,4 +44,5 @@ class Reproduce:
                     bar=lambda title, total: progress_bar(title, total, self.output),
                 )
                 print_table(tables[name], self.output.console)
-        return tables[name] if len(tables) == 1 else {"experiments": tables}
+        only = next(iter(tables.values()))
+        return only if len(tables) == 1 else {"experiments": tables}

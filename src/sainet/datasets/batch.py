@@ -1,5 +1,7 @@
 """A batch of stored pushes as the types that engines and models work on."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -63,7 +65,9 @@ def to_batch(
 def to_scene(arrays: dict[str, np.ndarray], info: StoreInfo) -> Scene:
     """Return the scenes of stored pushes; the field of friction is not known."""
     names = ("mass", "radius", "table_friction", "disk_friction", "pusher_friction")
-    known = {name: jnp.asarray(arrays[name]) for name in (*names, "pusher_radius")}
+    known: dict[str, Any] = {
+        name: jnp.asarray(arrays[name]) for name in (*names, "pusher_radius")
+    }
     return Scene(**known, time_step=info.time_step)
 
 

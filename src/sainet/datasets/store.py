@@ -132,12 +132,13 @@ def _read_info(folder: Path) -> StoreInfo:
     missing = sorted(names - attributes.keys())
     if missing:
         raise BadStore(f"{path}: {missing[0]} is missing; make the dataset again.")
-    known = {name: attributes[name] for name in names}
+    known: dict[str, Any] = {name: attributes[name] for name in names}
     for name, makes_sense in _SENSE.items():
         if not makes_sense(known[name]):
             raise BadStore(f"{path}: {name} is {known[name]!r}; make it again.")
-    lists = {k: tuple(v) for k, v in known.items() if isinstance(v, list)}
-    return StoreInfo(**(known | lists))
+    for name, value in known.items():
+        known[name] = tuple(value) if isinstance(value, list) else value
+    return StoreInfo(**known)
 
 
 def _check_files(folder: Path, hashes: dict[str, Any], *, verify: bool) -> None:

@@ -31,7 +31,7 @@ def ornstein_uhlenbeck(
     """
     keep = np.exp(-time_step / correlation_time)
     kick = deviation * np.sqrt(1 - keep**2) * rng.standard_normal(shape)
-    return lfilter([1.0], [1.0, -keep], kick, axis=1)
+    return np.asarray(lfilter([1.0], [1.0, -keep], kick, axis=1))
 
 
 def tracking_error(

@@ -12,8 +12,9 @@ _Check = tuple[Callable[[Any], bool], str]
 
 
 def _is_number(value: object) -> bool:
-    known = isinstance(value, int | float) and not isinstance(value, bool)
-    return known and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value)
 
 
 def _is_positive_list(value: object) -> bool:

@@ -12,14 +12,14 @@ from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
 from sainet.devices import BATCH, batch_mesh
-from sainet.models.interaction import InteractionNetwork, Layers
+from sainet.models.interaction import InteractionNetwork
 from sainet.training.batch import predict_batch, to_target
 from sainet.training.config import FitConfig
 from sainet.training.loss import LossWeights, push_losses
 
 _MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
 
-Trained = tuple[Layers, Layers]
+Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
 
 
 class FitState(eqx.Module):
@@ -103,7 +103,7 @@ def make_step(
             lambda g, w: g / config.batch_size + 2 * config.l2 * w, summed, layers
         )
         updates, moments = optimizer.update(mean, state.optimizer, layers)
-        network = with_layers(state.network, optax.apply_updates(layers, updates))  # pyright: ignore
+        network = with_layers(state.network, optax.apply_updates(layers, updates))
         return FitState(
             network, moments, state.iteration + 1
         ), total / config.batch_size

@@ -29,6 +29,15 @@ class _Pairs(NamedTuple):
     second: Int[Array, "pair *batch"]
 
 
+class _Stacked(NamedTuple):
+    """Properties with one axis over the bodies, so that pairs can be picked from it."""
+
+    radius: Array
+    inverse_mass: Array
+    inverse_inertia: Array
+    arm: Array  # of the disks alone
+
+
 def contact_budget(body_count: int) -> int:
     """Return how many pairs of bodies (the pusher included) can touch at once."""
     every = body_count * (body_count - 1) // 2
@@ -40,8 +49,13 @@ def solve_close_pairs(
     bodies: Bodies, properties: Properties, limits: tuple[Array, ...], step: Step
 ) -> tuple[Twist, ...]:
     """Return the bodies' velocities, as `solve_all_pairs` does."""
-    stacked = Properties(*map(_stack, properties[:5]), *properties[5:])
-    pairs, contacts = _closest(bodies, stacked, step)
+    stacked = _Stacked(
+        radius=_stack(properties.radius),
+        inverse_mass=_stack(properties.inverse_mass),
+        inverse_inertia=_stack(properties.inverse_inertia),
+        arm=_stack(properties.arm),
+    )
+    pairs, contacts = _closest(bodies, properties, stacked, step)
     limit = jnp.stack(limits)
     disks = slice(0, len(limits))
 
@@ -76,9 +90,9 @@ def _stack(values: tuple[Array, ...]) -> Array:
 
 
 def _closest(
-    bodies: Bodies, properties: Properties, step: Step
+    bodies: Bodies, properties: Properties, stacked: _Stacked, step: Step
 ) -> tuple[_Pairs, Contact]:
-    x, y, radius = _stack(bodies.x), _stack(bodies.y), properties.radius
+    x, y, radius = _stack(bodies.x), _stack(bodies.y), stacked.radius
     count = len(bodies.x)
     first, second = np.array(every_pair(count)).T
     distance = jnp.hypot(x[second] - x[first], y[second] - y[first])
@@ -93,8 +107,8 @@ def _closest(
             _pick(x, pairs.second) - _pick(x, pairs.first),
             _pick(y, pairs.second) - _pick(y, pairs.first),
         ),
-        _sides(properties, pairs.first),
-        _sides(properties, pairs.second),
+        _sides(stacked, pairs.first),
+        _sides(stacked, pairs.second),
         friction=jnp.where(
             pairs.first == count - 1,
             jnp.broadcast_to(properties.pusher_friction, nearest.shape),
@@ -106,11 +120,11 @@ def _closest(
     return pairs, contact
 
 
-def _sides(properties: Properties, index: Array) -> Side:
+def _sides(stacked: _Stacked, index: Array) -> Side:
     return Side(
-        radius=_pick(properties.radius, index),
-        inverse_mass=_pick(properties.inverse_mass, index),
-        inverse_inertia=_pick(properties.inverse_inertia, index),
+        radius=_pick(stacked.radius, index),
+        inverse_mass=_pick(stacked.inverse_mass, index),
+        inverse_inertia=_pick(stacked.inverse_inertia, index),
     )
 
 
