@@ -49,7 +49,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
             args=words or ["--help"],
             prog="sainet",
             description=_DESCRIPTION,
-            config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagConversionOff),
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
         )
         finish(command.run(), command.output)
     except SainetError as error:

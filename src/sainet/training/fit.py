@@ -63,7 +63,7 @@ def fit(
         config: of the training.
         out: the run folder.
         assumed_engine: whose stored prediction SAIN sees.
-        on_step: told the finished iterations and the loss of the last.
+        on_step: told the finished iterations and the loss that was last logged.
 
     Raises:
         RunConflict: the folder holds something else.
