@@ -21,7 +21,7 @@ PIP_TOOLS := pip-tools==7.6.2
 PLAIN_PIP := env -u PIP_FIND_LINKS -u PIP_EXTRA_INDEX_URL -u PIP_INDEX_URL \
 	PIP_CONFIG_FILE=/dev/null CUSTOM_COMPILE_COMMAND="make lock"
 
-.PHONY: help setup test demo check format bench lock lower-bounds torch-env clean
+.PHONY: help setup test demo check format results bench lock lower-bounds torch-env clean
 
 help:  ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) \
@@ -46,6 +46,9 @@ check: setup  ## Lint, format, types and floors
 format: setup  ## Rewrite the sources the way `make check` wants them
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
+
+results: setup  ## Measure every figure of docs/results.md again (long)
+	$(BIN)/python tools/results.py
 
 bench: setup  ## Run the benchmarks
 	$(BIN)/sainet bench

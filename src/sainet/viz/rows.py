@@ -119,10 +119,23 @@ def arrange(
         bodies=bodies,
         lines=tuple(_mark_best(_lines(ours, used, bodies, labels))),
         published=tuple(filter(_has_numbers, _lines(theirs, used, bodies, labels))),
-        comparisons=tuple(
-            _sentence(each, labels) for each in result.get("comparisons") or ()
-        ),
+        comparisons=tuple(_sentence(each, labels) for each in _worth_saying(result)),
     )
+
+
+def _worth_saying(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the comparisons that a reader has to see; the JSON holds them all.
+
+    Everything beats physics with wrong properties, and the end of a push tells what
+    its mean tells; where nothing else was compared, these are kept.
+    """
+    every = list(result.get("comparisons") or ())
+    telling = [
+        each
+        for each in every
+        if each["against"] != "physics" and not each["metric"].startswith("final")
+    ]
+    return telling or every
 
 
 def _lines(

@@ -1,0 +1,117 @@
+"""The commands as a user types them: exit statuses, error lines, JSON at the end."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SAINET = [sys.executable, "-m", "sainet"]
+SMALL = ["--pushes", "24", "--chunk-size", "12", "--workers", "1", "--quiet"]
+
+
+def sainet(*words, status=0):
+    done = subprocess.run(
+        [*SAINET, *map(str, words)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == status, done.stderr
+    return done
+
+
+def test_version():
+    assert sainet("--version").stdout == "sainet 0.1.0\n"
+
+
+def test_without_words_the_help_is_shown():
+    shown = sainet().stdout
+    for name in ("demo", "generate", "import", "train", "evaluate", "reproduce"):
+        assert name in shown
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (("generate", "robot", "--pushes", "0"), ("--pushes", "at least 1")),
+        (("generate", "robot", "--radius-mm", "-1"), ("--radius-mm", "positive")),
+        (("generate", "robot", "--mass-kg", "nan"), ("--mass-kg", "positive")),
+        (("generate", "robot", "--gap-mm", "-2"), ("--gap-mm", "overlap")),
+        (("generate", "robot", "--workers", "0"), ("--workers", "at least 1")),
+    ],
+)
+def test_bad_settings_are_named_and_nothing_is_made(tmp_path, words, names):
+    out = tmp_path / "out"
+    error = sainet(*words, "--out", out, status=2).stderr
+    assert error.startswith("sainet: ")
+    assert len(error.splitlines()) == 1
+    assert all(name in error for name in names)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        (("train", "sain", "--data", "nowhere", "--out", "x"), ("nowhere", "generate")),
+        (("evaluate", "--data", "nowhere"), ("nowhere", "generate")),
+        (("import", "mitpush-endpoints", "no.csv", "--out", "x"), ("no.csv",)),
+        (("reproduce", "no-such-table"), ("no-such-table", "robot-planar")),
+        (("bench", "no-such-case"), ("no-such-case", "training")),
+    ],
+)
+def test_what_is_missing_is_named(tmp_path, monkeypatch, words, names):
+    monkeypatch.chdir(tmp_path)
+    error = sainet(*words, status=2).stderr
+    assert "Traceback" not in error
+    assert all(name in error for name in names)
+    assert not list(tmp_path.glob("x"))
+
+
+def test_an_unknown_command_is_a_usage_error():
+    sainet("fly", status=2)
+
+
+@pytest.fixture(scope="module")
+def pushes(tmp_path_factory):
+    out = tmp_path_factory.mktemp("cli") / "pushes"
+    done = sainet("generate", "robot", *SMALL, "--out", out, "--json")
+    assert json.loads(done.stdout.splitlines()[-1]) == {"out": str(out), "pushes": 24}
+    return out
+
+
+def test_the_same_settings_do_nothing_again_and_others_are_refused(pushes):
+    before = {p: p.stat().st_mtime_ns for p in pushes.rglob("*")}
+    sainet("generate", "robot", *SMALL, "--out", pushes)
+    other = [*SMALL[:1], "25", *SMALL[2:]]
+    error = sainet("generate", "robot", *other, "--out", pushes, status=2).stderr
+    assert "pushes is 24 there and 25 here" in error
+    assert {p: p.stat().st_mtime_ns for p in pushes.rglob("*")} == before
+
+
+@pytest.mark.slow
+def test_train_and_evaluate(pushes, tmp_path):
+    out = tmp_path / "net"
+    few = ("--iterations", 2, "--batch-size", 4, "--steps", 10, "--quiet", "--json")
+    done = sainet("train", "sain", "--data", pushes, "--out", out, *few)
+    assert json.loads(done.stdout)["model"] == "sain"
+    assert (out / "learning-curve.svg").stat().st_size > 0
+    words = ("--model", "physics", out, "--data", pushes, "--json", "--quiet")
+    result = json.loads(sainet("evaluate", *words).stdout)
+    assert {row["model"] for row in result["rows"]} == {"physics", "net"}
+    row = result["rows"][0]
+    assert row["n"] == 24
+    for name in ("trans_percent", "pos_mm", "rot_deg", "final_pos_mm", "final_rot_deg"):
+        low, high = row[name + "_interval"]
+        assert low <= row[name] <= high
+
+
+def test_a_network_for_other_pushes_is_refused(pushes, tmp_path):
+    out = tmp_path / "net"
+    few = ("--iterations", 1, "--batch-size", 4, "--steps", 5, "--quiet")
+    sainet("train", "in", "--data", pushes, "--out", out, *few)
+    card = out / "card.json"
+    card.write_text(
+        card.read_text().replace('"kind": "robot"', '"kind": "direct-force"')
+    )
+    error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr
+    assert str(Path(out)) in error
+    assert "--force" in error
