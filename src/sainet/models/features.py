@@ -1,6 +1,6 @@
 """What the two networks are shown, as numbers.
 
-The paper's features (eq. 4 to 5 for the plain network, eq. 8 to 9 with the simulator's
+The paper's features (eq. 4 to 5 for the plain network, eq. 9 to 10 with the simulator's
 prediction), in the push frame. A part that a network is not shown is an empty array,
 so that the same code serves both.
 """

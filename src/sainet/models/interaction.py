@@ -102,7 +102,7 @@ class InteractionNetwork(eqx.Module):
     def acceleration(
         self, motion: Float[Array, "body 6"], still: Still, drive: Drive
     ) -> Float[Array, "body 3"]:
-        """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 6 and 10)."""
+        """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 5 and 10)."""
         effect = self._effects(motion, still, drive)
         features = body_features(motion, still, drive)
         shown = _standardise(
@@ -159,7 +159,7 @@ def unroll(
     still: Still,
     drive: Drive,
 ) -> Float[Array, "time push body 6"]:
-    """Predict recurrently from each initial motion, all in the push frame (eq. 2).
+    """Predict recurrently from each initial motion, all in the push frame (eq. 1).
 
     Args:
         network: to be applied at every step.

@@ -15,7 +15,7 @@ from sainet.training.loss import Target
 def predict_batch(
     network: InteractionNetwork, batch: PushBatch
 ) -> Float[Array, "time push body 6"]:
-    """Predict each push recurrently from its start, with the stored s-bar (eq. 2)."""
+    """Predict each push recurrently from its start, with the stored s-bar (eq. 1)."""
     carry = LearnedCarry(batch.initial, push_frame(batch.scene, batch.initial))
     start = pack_motion(batch.initial) if network.sizes.augmented else None
     simulated = batch.simulated if network.sizes.augmented else None

@@ -1,0 +1,57 @@
+"""The demo from its first push to its report, which opens and plays in a browser."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from selenium.webdriver.support.ui import WebDriverWait
+
+from sainet.errors import UnknownName
+from sainet.experiments import EXPERIMENTS, load_experiment
+from sainet.experiments.published import ROBOT_TWO_DISKS, published_rows
+from viz.test_report_browser import element, milliseconds, opened
+
+TINY = ("--pushes", "100", "--test-pushes", "6", "--iterations", "2")
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    out = tmp_path_factory.mktemp("demo") / "demo"
+    command = [sys.executable, "-m", "sainet", "demo", *TINY, "--out", str(out)]
+    done = subprocess.run(
+        [*command, "--json", "--quiet"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return out, json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_the_demo_compares_four_models_on_both_disks(demo):
+    _, result = demo
+    rows = {(row["model"], row["body"]) for row in result["rows"]}
+    models = ("physics", "physics-calibrated", "in", "sain")
+    assert rows == {(model, body) for model in models for body in (1, 2)}
+    assert all(row["n"] == 6 for row in result["rows"])
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_report_of_the_demo_plays(demo, chromium):
+    out, _ = demo
+    with opened(chromium, out, "--force-prefers-reduced-motion") as driver:
+        before = milliseconds(driver)
+        element(driver, "play").click()
+        WebDriverWait(driver, 20).until(lambda page: milliseconds(page) > before)
+
+
+def test_an_unknown_experiment_lists_the_known():
+    with pytest.raises(UnknownName, match="robot-planar"):
+        load_experiment("table-9")
+    assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
+
+
+def test_published_rows_are_the_papers():
+    rows = published_rows(ROBOT_TWO_DISKS)
+    sain = next(r for r in rows if r["model"] == "sain" and r["body"] == 2)
+    assert (sain["pos_mm"], sain["rot_deg"], sain["trans_percent"]) == (3.47, 0.21, 1.5)
