@@ -129,7 +129,7 @@ def _worth_saying(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     Everything beats physics with wrong properties, and the end of a push tells what
     its mean tells; where nothing else was compared, these are kept.
     """
-    every = list(result.get("comparisons") or ())
+    every: list[Mapping[str, Any]] = list(result.get("comparisons") or ())
     telling = [
         each
         for each in every
