@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+
 from support import REPOSITORY
 
 EXAMPLES = sorted((REPOSITORY / "examples").glob("*.py"))
