@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -104,14 +103,12 @@ def test_train_and_evaluate(pushes, tmp_path):
         assert low <= row[name] <= high
 
 
-def test_a_network_for_other_pushes_is_refused(pushes, tmp_path):
+def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):
     out = tmp_path / "net"
     few = ("--iterations", 1, "--batch-size", 4, "--steps", 5, "--quiet")
     sainet("train", "in", "--data", pushes, "--out", out, *few)
-    card = out / "card.json"
-    card.write_text(
-        card.read_text().replace('"kind": "robot"', '"kind": "direct-force"')
-    )
+    card = json.loads((out / "card.json").read_text())
+    (out / "card.json").write_text(json.dumps(card | {"time_step": 0.01}))
     error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr
-    assert str(Path(out)) in error
+    assert f"{out}/card.json: time_step is 0.01 s" in error
     assert "--force" in error
