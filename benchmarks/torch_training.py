@@ -54,7 +54,7 @@ class InteractionNetwork(nn.Module):
         motion, path = arrays["initial"], []
         still = torch.stack([arrays["mass"], arrays["radius"]], dim=-1)
         for time in range(arrays["action"].shape[1]):
-            motion = self.step(motion, still, arrays, time)
+            motion = self.step(bound_gradient(motion, arrays), still, arrays, time)
             path.append(motion)
         return torch.stack(path, dim=1)
 
@@ -86,6 +86,24 @@ class InteractionNetwork(nn.Module):
     def standardise(self, x: Tensor, mean: Tensor, deviation: Tensor) -> Tensor:
         """Bring features to unit size and bound them smoothly."""
         return self.bound * torch.tanh((x - mean) / deviation / self.bound)
+
+
+def bound_gradient(motion: Tensor, arrays: Arrays) -> Tensor:
+    """Return the motion; on the way back, shorten each push's gradient to the bound."""
+    if not motion.requires_grad:
+        return motion
+
+    def shorten(gradient: Tensor) -> Tensor:
+        # The loss is a mean over pushes here, and a sum where the bound is defined.
+        bound = arrays["gradient_bound"] / arrays["pushes"]
+        squared = (gradient * arrays["gradient_sizes"]).square().sum((-1, -2), True)
+        share = (bound * squared.clamp(min=1e-30).rsqrt()).clamp(max=1.0)
+        usable = squared.isfinite() & gradient.isfinite()
+        return torch.where(usable, gradient * share, 0.0)
+
+    bounded = motion.view_as(motion)
+    bounded.register_hook(shorten)
+    return bounded
 
 
 def body_features(motion: Tensor, still: Tensor, arrays: Arrays, time: int) -> Tensor:

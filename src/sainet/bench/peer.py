@@ -13,6 +13,7 @@ import numpy as np
 
 from sainet.bench.problem import Problem
 from sainet.errors import SainetError
+from sainet.models.bounded import GRADIENT_BOUND, GRADIENT_SIZES
 from sainet.models.features import drives, still_features
 from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
 from sainet.models.interaction import FEATURE_BOUND
@@ -87,6 +88,9 @@ def save_problem(path: Path, problem: Problem) -> Path:
         arrays |= {f"{group}_{name}": value for name, value in vars(tree).items()}
     settings = {
         "feature_bound": FEATURE_BOUND,
+        "gradient_bound": GRADIENT_BOUND,
+        "gradient_sizes": GRADIENT_SIZES,
+        "pushes": problem.config.batch_size,
         "time_step": network.time_step,
         "learning_rate": problem.config.learning_rate,
         "clip_norm": problem.config.clip_norm,

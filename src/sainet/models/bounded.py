@@ -6,8 +6,8 @@ from jaxtyping import Array, Float
 
 # Typical sizes of x, y (m), angle (rad) and their rates: they make a gradient with
 # respect to packed motion one without units.
-_SIZES = (0.01, 0.01, 0.05, 0.03, 0.03, 0.2)
-_BOUND = 5.0  # of a push's loss to its motion in these sizes; about 1 is usual
+GRADIENT_SIZES = (0.01, 0.01, 0.05, 0.03, 0.03, 0.2)
+GRADIENT_BOUND = 5.0  # of a push's loss to its motion in these sizes; about 1 is usual
 
 
 @jax.custom_vjp
@@ -25,10 +25,12 @@ def _forward(motion: Array) -> tuple[Array, None]:
 
 
 def _backward(_: None, gradient: Array) -> tuple[Array]:
-    sizes = jnp.broadcast_to(jnp.array(_SIZES, gradient.dtype), gradient.shape)
+    sizes = jnp.broadcast_to(jnp.array(GRADIENT_SIZES, gradient.dtype), gradient.shape)
     squared = jnp.sum((gradient * sizes) ** 2, axis=(-1, -2), keepdims=True)
     # An overflow is worth nothing: its direction is lost as well.
-    share = jnp.minimum(1.0, _BOUND * jax.lax.rsqrt(jnp.maximum(squared, 1e-30)))
+    share = jnp.minimum(
+        1.0, GRADIENT_BOUND * jax.lax.rsqrt(jnp.maximum(squared, 1e-30))
+    )
     usable = jnp.isfinite(squared) & jnp.isfinite(gradient)
     return (jnp.where(usable, gradient * share, 0.0),)
 
