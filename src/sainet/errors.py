@@ -39,3 +39,10 @@ class UnknownName(BadInput):
 
 class Diverged(SainetError):
     """A rollout or a training run left the finite numbers."""
+
+
+def require_option(condition: bool, name: str, wanted: str, value: object) -> None:
+    """Raise `BadInput` for the command-line option that set a value, if it is bad."""
+    if not condition:
+        option = "--" + name.replace("_", "-")
+        raise BadInput(f"{option} is {value}; it must be {wanted}.")

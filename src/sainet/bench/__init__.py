@@ -5,13 +5,11 @@ speed drifts; `docs/benchmarks.md` says what each of them means.
 """
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
-from sainet.errors import UnknownName
+from sainet.names import load_named
 
-# Each name leads to a module and a function in it that takes `runs`, loaded when asked
-# for: listing the cases must not load JAX.
+# Functions that take `runs`.
 CASES = {
     "engines": "sainet.bench.engines:bench_engines",
     "training": "sainet.bench.training:bench_training",
@@ -24,8 +22,4 @@ def load_case(name: str) -> Callable[..., dict[str, Any]]:
     Raises:
         UnknownName: no case has this name.
     """
-    if name not in CASES:
-        available = ", ".join(sorted(CASES))
-        raise UnknownName(f"No benchmark named {name!r}. Available: {available}.")
-    module, _, function = CASES[name].partition(":")
-    return getattr(import_module(module), function)
+    return load_named("benchmark", CASES, name)

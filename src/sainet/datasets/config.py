@@ -7,7 +7,7 @@ from tyro.conf import Positional
 
 from sainet.engines import ENGINES
 from sainet.engines.config import NoiseConfig, NoiseLevel
-from sainet.errors import BadInput
+from sainet.errors import require_option
 
 Setup = Literal["robot", "direct-force"]
 _RIGHT_ANGLE = 90  # degrees
@@ -76,20 +76,24 @@ class GenerateConfig:
         _require_one_of("engine", self.engine, tuple(ENGINES))
         _require_one_of("assumed-engine", self.assumed_engine, tuple(ENGINES))
         for name in ("disks", "pushes", "chunk_size", "force_steps"):
-            _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
-        _require(self.hold_steps >= 0, "hold-steps", "at least 0", self.hold_steps)
-        _require(self.seed >= 0, "seed", "at least 0", self.seed)
+            require_option(
+                getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
+            )
+        require_option(
+            self.hold_steps >= 0, "hold-steps", "at least 0", self.hold_steps
+        )
+        require_option(self.seed >= 0, "seed", "at least 0", self.seed)
         for name in ("mass_kg", "radius_mm", "stroke_mm", "speed_mm_s"):
             _check_range(name, getattr(self, name), positive=True)
         for name in ("table_friction", "contact_friction"):
             _check_range(name, getattr(self, name), positive=False)
         for name in ("pusher_radius_mm", "force_n"):
             value = getattr(self, name)
-            _require(_finite(value) and value > 0, name, "positive", value)
+            require_option(_finite(value) and value > 0, name, "positive", value)
         for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
             value = getattr(self, name)
-            _require(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
-        _require(
+            require_option(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
+        require_option(
             _finite(self.gap_mm) and self.gap_mm >= 0,
             "gap-mm",
             "zero or positive (disks must not overlap)",
@@ -107,7 +111,7 @@ def _check_range(name: str, values: Range, *, positive: bool) -> None:
     wanted = "positive, low before high" if positive else "0 or more, low before high"
     good = len(values) in (1, 2) and all(map(_finite, values))
     good = good and (values[0] > 0 if positive else values[0] >= 0)
-    _require(good and values[0] <= values[-1], name, wanted, values)
+    require_option(good and values[0] <= values[-1], name, wanted, values)
 
 
 def _check_noise(noise: NoiseConfig) -> None:
@@ -115,18 +119,12 @@ def _check_noise(noise: NoiseConfig) -> None:
         scale = name in ("correlation_time", "friction_length_mm")
         good = _finite(value) and (value > 0 if scale else value >= 0)
         wanted = "positive" if scale else "0 or more"
-        _require(good, f"noise.{name}", wanted, value)
+        require_option(good, f"noise.{name}", wanted, value)
 
 
 def _require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    _require(value in known, name, "one of " + ", ".join(known), value)
+    require_option(value in known, name, "one of " + ", ".join(known), value)
 
 
 def _finite(value: float) -> bool:
     return abs(value) < float("inf")
-
-
-def _require(condition: bool, name: str, wanted: str, value: object) -> None:
-    if not condition:
-        option = "--" + name.replace("_", "-")
-        raise BadInput(f"{option} is {value}; it must be {wanted}.")

@@ -1,16 +1,13 @@
 """Engines that predict how pushed disks move, and the noise of the simulated world."""
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
-from sainet.errors import UnknownName
+from sainet.names import load_named
 
 if TYPE_CHECKING:
     from sainet.engines.base import AbstractEngine
 
-# Each name leads to a module and a class in it, so that a missing extra costs
-# nothing until it is asked for.
-ENGINES = {"planar": ("sainet.engines.planar.engine", "PlanarEngine")}
+ENGINES = {"planar": "sainet.engines.planar.engine:PlanarEngine"}
 
 
 def make_engine(name: str) -> "AbstractEngine":
@@ -19,8 +16,4 @@ def make_engine(name: str) -> "AbstractEngine":
     Raises:
         UnknownName: no engine has this name.
     """
-    if name not in ENGINES:
-        available = ", ".join(sorted(ENGINES))
-        raise UnknownName(f"No engine named {name!r}. Available: {available}.")
-    module, cls = ENGINES[name]
-    return getattr(import_module(module), cls)()
+    return load_named("engine", ENGINES, name)()

@@ -44,41 +44,33 @@ class Evaluation:
     def to_dict(self) -> dict[str, Any]:
         """Return rows, published rows and paired comparisons as JSON values."""
         pairs = combinations(self.errors.items(), 2)
-        parts = list(self._parts())
         return {
-            "rows": [
-                row
-                for group, part in parts
-                for name, errors in self.errors.items()
-                for row in error_rows(
-                    name,
-                    _select(errors, part),
-                    self.travel_mm[part],
-                    group=group,
-                    reference=self.reference,
-                )
-            ],
-            "published": [
-                _without_intervals(row)
-                for group, part in parts
-                for name, errors in self.published.items()
-                for row in error_rows(
-                    name,
-                    _select(errors, part),
-                    self.travel_mm[part],
-                    group=group,
-                    reference=self.reference,
-                )
-            ],
+            "rows": self._rows(self.errors),
+            "published": list(map(_without_intervals, self._rows(self.published))),
             "comparisons": [
                 row
                 for (one, a), (other, b) in pairs
-                for group, part in parts
+                for group, part in self._parts()
                 for row in comparison_rows(
                     (other, _select(b, part)), (one, _select(a, part)), group=group
                 )
             ],
         }
+
+    def _rows(self, errors: dict[str, PushErrors]) -> list[dict[str, Any]]:
+        """Return the rows of each group, in it of each model."""
+        return [
+            row
+            for group, part in self._parts()
+            for name, found in errors.items()
+            for row in error_rows(
+                name,
+                _select(found, part),
+                self.travel_mm[part],
+                group=group,
+                reference=self.reference,
+            )
+        ]
 
     def _parts(self) -> Iterator[tuple[str | None, np.ndarray]]:
         """Yield each group and which pushes belong to it."""

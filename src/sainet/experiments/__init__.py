@@ -1,12 +1,11 @@
 """One module for each table or figure, published numbers beside ours, and the demo."""
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
-from sainet.errors import UnknownName
+from sainet.names import load_named
 
-EXPERIMENTS = {"robot-planar": "sainet.experiments.robot_planar"}
+EXPERIMENTS = {"robot-planar": "sainet.experiments.robot_planar:run"}
 
 
 def load_experiment(name: str) -> Callable[..., dict[str, Any]]:
@@ -15,7 +14,4 @@ def load_experiment(name: str) -> Callable[..., dict[str, Any]]:
     Raises:
         UnknownName: no experiment has this name.
     """
-    if name not in EXPERIMENTS:
-        available = ", ".join(sorted(EXPERIMENTS))
-        raise UnknownName(f"No experiment named {name!r}. Available: {available}.")
-    return import_module(EXPERIMENTS[name]).run
+    return load_named("experiment", EXPERIMENTS, name)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from sainet.errors import BadInput
+from sainet.errors import require_option
 
 ModelKind = Literal["in", "sain"]
 
@@ -48,19 +48,19 @@ class FitConfig:
     def __post_init__(self) -> None:
         """Refuse settings that no training can have."""
         for name in ("iterations", "batch_size", "halve_every", "steps"):
-            _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
+            require_option(
+                getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
+            )
         for name in ("log_every", "checkpoint_every"):
-            _require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
+            require_option(
+                getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
+            )
         for name in ("learning_rate", "clip_norm"):
             value = getattr(self, name)
-            _require(math.isfinite(value) and value > 0, name, "positive", value)
+            require_option(math.isfinite(value) and value > 0, name, "positive", value)
         weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
         for name in ("l2", *weights, "validation_pushes", "seed"):
             value = getattr(self, name)
-            _require(math.isfinite(value) and value >= 0, name, "0 or more", value)
-
-
-def _require(condition: bool, name: str, wanted: str, value: object) -> None:
-    if not condition:
-        option = "--" + name.replace("_", "-")
-        raise BadInput(f"{option} is {value}; it must be {wanted}.")
+            require_option(
+                math.isfinite(value) and value >= 0, name, "0 or more", value
+            )
