@@ -60,6 +60,9 @@ lock:  ## Remake requirements.lock, on Python 3.11
 		--generate-hashes --strip-extras --allow-unsafe --no-annotate \
 		--no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
 		--output-file requirements.lock pyproject.toml
+	# Made on Python 3.11, the lock would ask for it on newer ones as well.
+	sed -i 's/^pybullet==\([^ ;]*\) /pybullet==\1 ; python_version < "3.12" /' \
+		requirements.lock
 	rm -rf .venv-lock
 
 lower-bounds:  ## Run the suite with the oldest dependencies that pyproject.toml allows

@@ -37,6 +37,10 @@ class UnknownName(BadInput):
     """A name that no registry holds."""
 
 
+class MissingExtra(BadInput):
+    """What was asked for needs a package that is not installed."""
+
+
 class Diverged(SainetError):
     """A rollout or a training run left the finite numbers."""
 

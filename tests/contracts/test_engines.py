@@ -101,6 +101,13 @@ def assert_same_motion(found: State, wanted: State, tolerance: float):
         assert lever * gap.max() < tolerance, f"{field} differs by {gap.max():.2g}"
 
 
+def assert_same_on_average(found: State, wanted: State, tolerance: float):
+    """Likewise the mean over scenes, steps and disks."""
+    for field, lever in (("position", 1), ("angle", 0.05)):
+        gap = lever * np.abs(np.asarray(getattr(found, field)) - getattr(wanted, field))
+        assert gap.mean() < tolerance, f"{field} differs by {gap.mean():.2g}"
+
+
 def energies(scene: Scene, velocity, spin) -> np.ndarray:
     """Kinetic energy of all disks of each scene (J), in double precision."""
     mass, radius = (np.asarray(x, np.float64) for x in (scene.mass, scene.radius))
@@ -132,7 +139,7 @@ def test_coasting_disks_stop_where_coulomb_says(name):
     relative = TOLERANCES[name].stopping
     np.testing.assert_allclose(travel, speed**2 / (2 * slowing), rtol=relative)
     np.testing.assert_allclose(moved.sum(1) * TIME_STEP, speed / slowing, rtol=relative)
-    assert np.abs(states.angle).max() < 1e-6
+    assert np.abs(states.angle).max() < TOLERANCES[name].yaw
 
 
 @every_engine
@@ -164,7 +171,9 @@ def test_kinetic_energy_never_grows_without_the_pusher(name):
         after = energies(scene, states.velocity, states.spin)
         energy = np.concatenate([first, after], axis=1)
         growth = energy[:, 1:] - energy[:, :-1] * (1 + TOLERANCES[name].energy)
-        assert growth.max() < 1e-11, f"{bodies} disks gain {growth.max():.2g} J"
+        assert growth.max() < TOLERANCES[name].still_energy, (
+            f"{bodies} disks gain {growth.max():.2g} J"
+        )
         assert (energy[:, -1] < energy[:, 0]).all()
 
 
@@ -176,9 +185,10 @@ def test_what_rests_keeps_resting(name):
     spread = eqx.tree_at(lambda s: s.position, start, start.position * 1.001)
     spread = eqx.tree_at(lambda s: s.pusher_position, spread, jnp.full((16, 2), FAR))
     states = roll(engine(name), scene, spread, far_away(16, 60)).states
-    np.testing.assert_array_equal(states.position, over_time(spread.position, 60))
-    assert not np.asarray(states.velocity).any()
-    assert not np.asarray(states.spin).any()
+    most = TOLERANCES[name].rest
+    assert np.abs(states.position - over_time(spread.position, 60)).max() <= most
+    assert np.abs(states.velocity).max() <= most
+    assert np.abs(states.spin).max() <= 20 * most
 
 
 # Pushing.
@@ -233,14 +243,15 @@ def test_contact_sticks_or_slips_as_coulomb_says(name):
     start = moving(np.full((count, 1, 2), [radius + pusher_radius, 0.0]), 0.0)
     start = eqx.tree_at(lambda s: s.pusher_position, start, jnp.zeros((count, 2)))
     heading = np.stack([np.cos(angle), np.sin(angle)], -1)
-    after = roll(engine(name), scene, start, _straight(speed * heading, 1)).final
+    steps = TOLERANCES[name].impact_steps
+    after = roll(engine(name), scene, start, _straight(speed * heading, steps)).final
     across = np.clip(
         np.sin(angle) / 3, -friction * np.cos(angle), friction * np.cos(angle)
     )
     assert np.any(across == np.sin(angle) / 3)
     assert np.any(across != np.sin(angle) / 3)
     wanted = speed * np.stack([np.cos(angle), across], -1)
-    tolerance = TOLERANCES[name].impact
+    tolerance = TOLERANCES[name].impact * speed
     np.testing.assert_allclose(after.velocity[:, 0], wanted, atol=tolerance)
     turning = -2 * speed * across / radius
     np.testing.assert_allclose(after.spin[:, 0], turning, atol=tolerance / radius)
@@ -319,10 +330,10 @@ def test_collisions_on_ice_keep_the_momenta(name):
 def test_collisions_do_not_bounce(name):
     _, start, states, normal = _collisions(name)
     approach = np.sum((start.velocity[:, 0] - start.velocity[:, 1]) * normal, -1)
-    first = np.asarray(states.velocity[:, 0])
-    parting = np.sum((first[:, 1] - first[:, 0]) * normal, -1)
+    after = np.asarray(states.velocity[:, TOLERANCES[name].impact_steps - 1])
+    parting = np.sum((after[:, 1] - after[:, 0]) * normal, -1)
     assert np.median(approach) > 0.1
-    assert np.abs(parting).max() < TOLERANCES[name].impact
+    assert np.abs(parting / (approach + 0.1)).max() < TOLERANCES[name].impact
 
 
 # Symmetries.
@@ -335,7 +346,10 @@ def test_changed_scenes_change_the_motion_alike(name, setup, bodies, change):
     index = 1 + list(PLACEMENTS).index(change)
     states = case(name, setup, bodies).states
     wanted = PLACEMENTS[change].state(part(states, 0))
-    assert_same_motion(part(states, index), wanted, TOLERANCES[name].symmetry)
+    tolerance = TOLERANCES[name]
+    found = part(states, index)
+    assert_same_motion(found, wanted, tolerance.worst_symmetry)
+    assert_same_on_average(found, wanted, tolerance.symmetry)
 
 
 @every_engine
@@ -394,7 +408,7 @@ def test_overlaps_are_undone_and_their_steps_add_up(name, bodies):
     depth = -np.asarray(pair_gaps(scene, start)).min((1, 2))
     left = -np.asarray(pair_gaps(over_time(scene, 240), states)).min((2, 3))
     assert depth.max() > 1e-3
-    assert left[:, -1].max() < 5e-6
+    assert left[:, -1].max() < TOLERANCES[name].overlap_left
     assert left[:, :24].max() < depth.max() + 1e-6, "an overlap grew"
 
 
@@ -405,11 +419,12 @@ def test_two_advances_equal_one(name, setup, bodies):
     half = STEPS // 2
     one = roll(engine(name), scene, start, first_steps(controls, half))
     two = roll(engine(name), scene, one.final, later_steps(controls, half))
-    for field in ("position", "angle", "velocity", "spin", "pusher_velocity"):
+    most = TOLERANCES[name].advance
+    sizes = {"position": 1, "angle": 20, "velocity": 240, "spin": 5000}
+    for field, size in (sizes | {"pusher_velocity": 240}).items():
         again = [getattr(states, field) for states in (one.states, two.states)]
-        np.testing.assert_array_equal(
-            np.concatenate(again, axis=1), getattr(states, field), err_msg=field
-        )
+        gap = np.abs(np.concatenate(again, axis=1) - getattr(states, field))
+        assert gap.max() <= size * most, f"{field} differs by {gap.max():.2g}"
 
 
 @every_engine

@@ -4,10 +4,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sainet.cli.devices import use_devices, worker_pool
+from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.experiments.config import DemoConfig
+from sainet.processes import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sainet.cli.devices import worker_pool
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.datasets.config import GenerateConfig
+from sainet.processes import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)

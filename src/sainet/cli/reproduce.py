@@ -6,10 +6,11 @@ from typing import Any
 
 from tyro.conf import Positional
 
-from sainet.cli.devices import use_devices, worker_pool
+from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.experiments.config import Scale
+from sainet.processes import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,10 @@ from sainet.names import load_named
 if TYPE_CHECKING:
     from sainet.engines.base import AbstractEngine
 
-ENGINES = {"planar": "sainet.engines.planar.engine:PlanarEngine"}
+ENGINES = {
+    "bullet": "sainet.engines.bullet.engine:BulletEngine",
+    "planar": "sainet.engines.planar.engine:PlanarEngine",
+}
 
 
 def make_engine(name: str) -> "AbstractEngine":
@@ -15,5 +18,6 @@ def make_engine(name: str) -> "AbstractEngine":
 
     Raises:
         UnknownName: no engine has this name.
+        MissingExtra: the engine needs a package that is not installed.
     """
     return load_named("engine", ENGINES, name)()

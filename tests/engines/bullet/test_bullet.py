@@ -1,0 +1,102 @@
+"""What is Bullet's own: its bits, its processes, its friction, and life without it."""
+
+import subprocess
+import sys
+from importlib.util import find_spec
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from contracts.worlds import far_away, make_scene, moving, pushed, roll, rows
+from sainet.datasets.config import GenerateConfig
+from sainet.engines import make_engine
+from sainet.errors import MissingExtra
+from sainet.scene import GRAVITY, FrictionField
+from support import require
+
+
+@pytest.fixture(autouse=True)
+def _installed():
+    require(find_spec("pybullet"), "PyBullet is not installed")
+
+
+def same_bits(one, other) -> bool:
+    pairs = zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
+    return all(np.array_equal(a, b) for a, b in pairs)
+
+
+@pytest.mark.parametrize("setup", ["robot", "direct-force"])
+def test_a_push_is_the_same_bits_after_any_others(setup):
+    engine = make_engine("bullet")
+    some = pushed(GenerateConfig(setup=setup, disks=2, pushes=4), 1, 60)
+    others = pushed(GenerateConfig(disks=3, pushes=6), 2, 40)
+    before = roll(engine, *some).states
+    roll(engine, *others)
+    assert same_bits(roll(engine, *some).states, before)
+    # The other way round, within one batch.
+    backwards = roll(engine, *rows(some, slice(None, None, -1))).states
+    assert same_bits(rows(backwards, slice(None, None, -1)), before)
+
+
+def test_other_processes_give_the_same_bits():
+    many = pushed(GenerateConfig(disks=2, pushes=24), 3, 60)
+    together = roll(make_engine("bullet"), *many).states
+    for row in (0, 13, 23):
+        part = slice(row, row + 1)
+        alone = roll(make_engine("bullet"), *rows(many, part)).states
+        assert same_bits(alone, rows(together, part))
+
+
+def test_a_rollout_maps_over_any_axis():
+    scene, start, controls = pushed(GenerateConfig(disks=2, pushes=4), 4, 40)
+    engine = make_engine("bullet")
+    mapped = jax.vmap(engine.rollout)(scene, start, controls).states
+    assert same_bits(mapped, engine.rollout(scene, start, controls).states)
+
+
+def test_a_friction_field_slows_each_disk_where_it_is():
+    """Two disks far apart coast through fields that are constant where each is."""
+    scene = make_scene(np.ones((1, 2)), np.full((1, 2), 0.05), table=0.1)
+    # cos is +1 at x = 0 and -1 at x = 1, and flat at both.
+    field = FrictionField(
+        wave=jnp.array([[[np.pi, 0.0]]]),
+        phase=jnp.zeros((1, 1)),
+        amplitude=jnp.array([0.5]),
+    )
+    uneven = eqx.tree_at(
+        lambda s: s.friction_field, scene, field, is_leaf=lambda x: x is None
+    )
+    start = moving([[[0.0, 0.0], [1.0, 0.0]]], [[[0.0, 0.2], [0.0, 0.2]]])
+    final = roll(make_engine("bullet"), uneven, start, far_away(1, 240)).final
+    travel = np.asarray(final.position[0, :, 1])
+    wanted = 0.2**2 / (2 * GRAVITY * 0.1 * np.array([1.5, 0.5]))
+    np.testing.assert_allclose(travel, wanted, rtol=0.05)
+
+
+def test_the_pusher_is_where_its_path_says():
+    scene, start, controls = pushed(GenerateConfig(disks=2, pushes=4), 5, 100)
+    states = roll(make_engine("bullet"), scene, start, controls).states
+    gap = np.abs(np.asarray(states.pusher_position) - controls.position)
+    assert gap.max() < 2e-6
+
+
+@pytest.mark.parametrize(
+    ("version", "wanted"),
+    [((3, 11), "pip install 'sainet.bullet.'"), ((3, 13), "no wheels.*3.13")],
+)
+def test_without_pybullet_the_way_out_is_named(version, wanted, monkeypatch):
+    monkeypatch.setattr("sainet.engines.bullet.engine.find_spec", lambda _: None)
+    monkeypatch.setattr(sys, "version_info", (*version, 0))
+    with pytest.raises(MissingExtra, match=wanted):
+        make_engine("bullet")
+
+
+def test_nothing_is_printed_where_json_belongs():
+    code = "from sainet.engines.bullet.world import World; World(); print('{}')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "{}\n"
