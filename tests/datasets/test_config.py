@@ -15,7 +15,10 @@ NAN, INFINITE = float("nan"), float("inf")
 
 BAD = [
     ("engine", "plannar"),
-    ("assumed_engine", ""),
+    ("assumed_engine", ("",)),
+    ("assumed_engine", ()),
+    ("assumed_engine", ("planar", "planar")),
+    ("assumed_engine", ("planar", "mujoco")),
     ("disks", 0),
     ("pushes", 0),
     ("pushes", -3),

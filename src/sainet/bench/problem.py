@@ -34,7 +34,7 @@ def make_problem(pushes: int = 100, steps: int = 200) -> Problem:
     data = GenerateConfig(pushes=pushes, chunk_size=pushes)
     info = store_info(data)
     arrays = simulate_chunk(data, 0)
-    batch = to_batch(arrays, info, steps=steps, simulated=data.assumed_engine)
+    batch = to_batch(arrays, info, steps=steps, simulated=data.assumed_engine[0])
     config = FitConfig(batch_size=pushes, steps=steps)
     sizes = FeatureSizes(info.kind, augmented=True)
     network = InteractionNetwork(

@@ -23,7 +23,7 @@ class Train:
     out: Path
     """Run folder to write; the same settings go on where they stopped."""
     assumed_engine: str = "planar"
-    """Engine whose stored prediction SAIN corrects."""
+    """Engine whose stored prediction SAIN corrects, by the name in the dataset."""
     config: FitConfig = field(default_factory=FitConfig)
     devices: int | None = None
     """CPU devices to split a batch over; default: one a core."""

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 
 from tyro.conf import Positional
 
-from sainet.engines import ENGINES
+from sainet.engines import ASSUMED_ENGINES, ENGINES
 from sainet.engines.config import NoiseConfig, NoiseLevel
 from sainet.errors import require_option
 
@@ -30,8 +30,9 @@ class GenerateConfig:
     """Number of pushes."""
     engine: str = "planar"
     """Engine that makes the truth."""
-    assumed_engine: str = "planar"
-    """Engine that makes the prediction s-bar, with the paper's assumed properties."""
+    assumed_engine: tuple[str, ...] = ("planar",)
+    """Engines that predict s-bar: planar or bullet with the paper's assumed properties,
+    planar-calibrated or bullet-calibrated with the true masses and radii."""
     seed: int = 0
     """Of everything random; the same seed gives the same bytes."""
     mass_kg: Range = (0.85, 1.15)
@@ -74,7 +75,12 @@ class GenerateConfig:
         _require_one_of("setup", self.setup, get_args(Setup))
         _require_one_of("noise-level", self.noise_level, get_args(NoiseLevel))
         _require_one_of("engine", self.engine, tuple(ENGINES))
-        _require_one_of("assumed-engine", self.assumed_engine, tuple(ENGINES))
+        for name in self.assumed_engine:
+            _require_one_of("assumed-engine", name, ASSUMED_ENGINES)
+        unlike = len(set(self.assumed_engine)) == len(self.assumed_engine) > 0
+        require_option(
+            unlike, "assumed-engine", "one or more unlike names", self.assumed_engine
+        )
         for name in ("disks", "pushes", "chunk_size", "force_steps"):
             require_option(
                 getattr(self, name) >= 1, name, "at least 1", getattr(self, name)

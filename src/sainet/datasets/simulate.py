@@ -8,8 +8,7 @@ from sainet.datasets.batch import from_trajectory
 from sainet.datasets.config import GenerateConfig, bounds
 from sainet.datasets.sampling import Draws, chunk_generator, draw
 from sainet.datasets.schema import StoreInfo, simulated_name
-from sainet.engines import make_engine
-from sainet.engines.assumed import AssumedProperties
+from sainet.engines import make_assumed_engine, make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.config import NoiseConfig, at_level
 from sainet.engines.noise import (
@@ -51,7 +50,7 @@ def store_info(config: GenerateConfig) -> StoreInfo:
         chunk_size=config.chunk_size,
         time_step=TIME_STEP,
         engine=config.engine,
-        assumed_engines=(config.assumed_engine,),
+        assumed_engines=config.assumed_engine,
         has_measurements=True,
         seed=config.seed,
     )
@@ -73,8 +72,12 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     world = _with_friction_field(scene, noise, rng)
     actual = _disturb(controls, noise, rng, scene.time_step)
     truth, pusher = _rollout(make_engine(config.engine), world, initial, actual)
-    assumed = AssumedProperties(make_engine(config.assumed_engine))
-    simulated, _ = _rollout(assumed, scene, initial, controls)
+    simulated = {
+        simulated_name(name): _rollout(
+            make_assumed_engine(name), scene, initial, controls
+        )[0]
+        for name in config.assumed_engine
+    }
     pose = truth[..., :3]
     arrays = {
         **_scene_arrays(scene, initial, controls),
@@ -85,7 +88,7 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
         "measured": pose + capture_error(rng, pose.shape[:3], noise),
         "pose_observed": np.ones(pose.shape[:2]),
         "rate_observed": np.ones(pose.shape[:2]),
-        simulated_name(config.assumed_engine): simulated,
+        **simulated,
     }
     return {name: value[:pushes] for name, value in arrays.items()}
 

@@ -1,9 +1,12 @@
 """An engine that believes in fixed properties, whatever the scene is (the paper's)."""
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from sainet.engines import CALIBRATED
 from sainet.engines.base import AbstractEngine
 from sainet.pushes import Controls
 from sainet.scene import Scene, State, Trajectory
@@ -46,9 +49,19 @@ class AssumedProperties(AbstractEngine):
         return self.engine.rollout(self.assume(scene), initial, controls)
 
 
+def beliefs(name: str) -> dict[str, Any]:
+    """Return what an assumed engine of that name believes; None is the truth."""
+    known = name.endswith(CALIBRATED)
+    return {
+        "mass": None if known else PAPER_MASS,
+        "radius": None if known else PAPER_RADIUS,
+        "friction": PAPER_FRICTION,
+    }
+
+
 def calibrated(engine: AbstractEngine) -> AssumedProperties:
     """Wrap an engine that knows the true masses and radii, but not the friction."""
-    return AssumedProperties(engine, mass=None, radius=None)
+    return AssumedProperties(engine, **beliefs(CALIBRATED))
 
 
 def _replace(

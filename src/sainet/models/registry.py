@@ -1,9 +1,9 @@
 """Models by name: physics alone, or the folder of a trained network."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sainet.engines import ENGINES, make_engine
+from sainet.engines import ASSUMED_ENGINES, make_assumed_engine, make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
 from sainet.errors import BadCheckpoint, UnknownName
 from sainet.models.card import CARD, Card
@@ -73,14 +73,14 @@ def load_dynamics(name: str, *, engine: str = "planar") -> NamedDynamics:
 
 
 def _inner_engine(folder: Path, card: Card) -> AssumedProperties:
-    if card.inner_engine not in ENGINES:
+    if card.inner_engine not in ASSUMED_ENGINES:
         raise BadCheckpoint(
             f"{folder / CARD}: inner_engine is {card.inner_engine!r}; this sainet has "
-            f"{', '.join(sorted(ENGINES))}."
+            f"{', '.join(sorted(ASSUMED_ENGINES))}."
         )
     assumed = card.assumed or {}
-    return AssumedProperties(
-        make_engine(card.inner_engine),
+    return replace(
+        make_assumed_engine(card.inner_engine),
         mass=_tuple(assumed.get("mass")),
         radius=_tuple(assumed.get("radius")),
         friction=assumed.get("friction"),

@@ -14,7 +14,7 @@ from jax.sharding import NamedSharding, PartitionSpec
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
 from sainet.devices import batch_mesh
-from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
+from sainet.engines.assumed import beliefs
 from sainet.errors import Diverged
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
@@ -162,7 +162,6 @@ def _finish(
     history: list[dict[str, Any]],
 ) -> None:
     info, sain = task.store.info, task.model == "sain"
-    assumed = {"mass": PAPER_MASS, "radius": PAPER_RADIUS, "friction": PAPER_FRICTION}
     data = save_arrays(folder.path / WEIGHTS, network)
     card = Card(
         model=task.model,
@@ -170,7 +169,7 @@ def _finish(
         time_step=info.time_step,
         inner_engine=task.assumed_engine if sain else None,
         truth_engine=info.engine,
-        assumed=assumed if sain else None,
+        assumed=beliefs(task.assumed_engine) if sain else None,
         data=task.store.content,
         data_seed=info.seed,
         weights=content_hash(data),

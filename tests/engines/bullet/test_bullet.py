@@ -94,9 +94,10 @@ def test_without_pybullet_the_way_out_is_named(version, wanted, monkeypatch):
         make_engine("bullet")
 
 
-def test_nothing_is_printed_where_json_belongs():
+def test_nothing_is_printed():
     code = "from sainet.engines.bullet.world import World; World(); print('{}')"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout == "{}\n"
+    assert not done.stderr

@@ -1,4 +1,4 @@
-"""PyBullet, imported without the line that it prints: stdout may be for JSON alone."""
+"""PyBullet, imported without the line that it prints."""
 
 import ctypes
 import os
@@ -9,14 +9,17 @@ from typing import Any
 
 def _import_quietly(name: str) -> Any:  # noqa: ANN401
     sys.stdout.flush()
-    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    kept = [(os.dup(file), file) for file in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        for _, file in kept:
+            os.dup2(nowhere, file)
         module = import_module(name)
         ctypes.CDLL(None).fflush(None)  # it prints through C's buffer
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
+        for copy, file in kept:
+            os.dup2(copy, file)
+            os.close(copy)
         os.close(nowhere)
     return module
 
