@@ -22,7 +22,7 @@ from sainet.pushes import (
     place_pusher,
     push_direction,
 )
-from sainet.scene import TIME_STEP, Scene, State, Trajectory, at_rest
+from sainet.scene import TIME_STEP, Scene, State, at_rest
 from support import require
 
 FAR = 10.0  # m, where a pusher touches nothing
@@ -100,14 +100,6 @@ def engine(name: str) -> AbstractEngine:
     """One engine of each name for all tests, so that compiled rollouts are shared."""
     require(name != "bullet" or find_spec("pybullet"), "PyBullet is not installed")
     return make_engine(name)
-
-
-@eqx.filter_jit
-def roll(
-    engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
-) -> Trajectory:
-    """Rolls out, compiled once for each set of shapes."""
-    return engine.rollout(scene, initial, controls)
 
 
 def make_scene(mass, radius, *, table=0.2, contact=0.25, pusher_radius=0.0048) -> Scene:

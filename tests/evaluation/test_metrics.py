@@ -14,6 +14,7 @@ from sainet.evaluation.metrics import (
     PushErrors,
     final_errors,
     final_pose,
+    pooled,
     push_errors,
     travel_mm,
 )
@@ -200,6 +201,35 @@ def test_differences_are_paired():
     difference, low, high = difference_interval(better, hard)
     assert difference[0] == pytest.approx(-1, abs=0.1)
     assert -1.2 < low[0] < high[0] < -0.8
+
+
+def test_trainings_are_resampled_as_well():
+    rng = np.random.default_rng(6)
+    pushes = rng.normal(3, 1, (1, 200, 1))
+    luck = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])[:, None, None]
+    mean, low, high = mean_interval(pushes + luck)
+    _, low_one, high_one = mean_interval(pushes)
+    assert mean == pytest.approx(pushes.mean())
+    # Their spread of 0.71 over the root of 5, beside 1 over the root of 200.
+    wanted = 2 * 1.96 * np.hypot(0.707 / np.sqrt(5), 1 / np.sqrt(200))
+    assert high[0] - low[0] == pytest.approx(wanted, rel=0.1)
+    assert high[0] - low[0] > 3 * (high_one[0] - low_one[0])
+    # Trainings of two models are drawn apart: alike luck is no pair.
+    _, low, high = difference_interval(pushes + luck, pushes + luck + 0.1)
+    assert low[0] < -0.5 < 0.3 < high[0]
+
+
+def test_pooled_trainings_are_one_model():
+    rng = np.random.default_rng(7)
+    parts = [errors_of(rng.uniform(size=(10, 2))) for _ in range(3)]
+    whole = pooled(parts)
+    assert whole.trainings == 3
+    rows = error_rows("m", whole, np.ones((10, 2)), group=None, reference=0.25)
+    for body, row in enumerate(rows):
+        mean = np.mean([part.pos_mm[:, body].mean() for part in parts])
+        assert (row["trainings"], row["pos_mm"]) == (3, pytest.approx(mean))
+    few = whole.of_pushes(np.arange(10) < 4)
+    np.testing.assert_array_equal(few.rot_deg[2], parts[2].rot_deg[:4])
 
 
 def test_a_model_against_itself_differs_by_nothing():

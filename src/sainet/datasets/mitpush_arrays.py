@@ -1,6 +1,5 @@
 """Recorded pushes as the arrays of a store: what is known, and s-bar beside it."""
 
-import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
@@ -9,10 +8,9 @@ from sainet.datasets.mitpush_log import EndpointLog
 from sainet.datasets.schema import StoreInfo, published_name, simulated_name
 from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties
-from sainet.engines.base import AbstractEngine
+from sainet.engines.base import roll_out
 from sainet.errors import Diverged
-from sainet.pushes import Controls
-from sainet.scene import TIME_STEP, Scene, State, Trajectory
+from sainet.scene import TIME_STEP
 
 MASS = 0.8937  # kg
 RADIUS = 0.0525  # m
@@ -121,20 +119,13 @@ def _path(log: EndpointLog, info: StoreInfo) -> dict[str, np.ndarray]:
     }
 
 
-@eqx.filter_jit
-def _rollout(
-    engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
-) -> Trajectory:
-    return engine.rollout(scene, initial, controls)
-
-
 def _simulate(
     arrays: dict[str, np.ndarray], info: StoreInfo
 ) -> Float[np.ndarray, "push time body 6"]:
     """Return s-bar: what the engine predicts with the paper's assumed properties."""
     engine = AssumedProperties(make_engine(ASSUMED_ENGINE))
     scene, initial = to_scene(arrays, info), to_initial(arrays)
-    trajectory = _rollout(engine, scene, initial, to_controls(arrays, info))
+    trajectory = roll_out(engine, scene, initial, to_controls(arrays, info))
     motion, _ = from_trajectory(trajectory)
     if not np.isfinite(motion).all():
         push = int(np.argmin(np.isfinite(motion).all((1, 2, 3))))

@@ -9,7 +9,7 @@ from sainet.datasets.config import GenerateConfig, bounds
 from sainet.datasets.sampling import Draws, chunk_generator, draw
 from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.engines import make_assumed_engine, make_engine
-from sainet.engines.base import AbstractEngine
+from sainet.engines.base import AbstractEngine, roll_out
 from sainet.engines.config import NoiseConfig, at_level
 from sainet.engines.noise import (
     capture_error,
@@ -32,7 +32,6 @@ from sainet.scene import (
     FrictionField,
     Scene,
     State,
-    Trajectory,
     at_rest,
     pack_motion,
 )
@@ -181,17 +180,10 @@ def _disturb(
     )
 
 
-@eqx.filter_jit
-def _jit_rollout(
-    engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
-) -> Trajectory:
-    return engine.rollout(scene, initial, controls)
-
-
 def _rollout(
     engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
 ) -> tuple[np.ndarray, np.ndarray]:
-    return from_trajectory(_jit_rollout(engine, scene, initial, controls))
+    return from_trajectory(roll_out(engine, scene, initial, controls))
 
 
 def _scene_arrays(

@@ -44,6 +44,11 @@ class AssumedProperties(AbstractEngine):
             time_step=scene.time_step,
         )
 
+    @property
+    def on_host(self) -> bool:
+        """Whether the wrapped engine works outside JAX."""
+        return self.engine.on_host
+
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Roll the wrapped engine out in the assumed scene."""
         return self.engine.rollout(self.assume(scene), initial, controls)

@@ -18,3 +18,24 @@ class AbstractEngine(eqx.Module):
         All arguments share their leading batch axes. The final state holds all that
         is needed to go on: two rollouts in a row equal one long rollout.
         """
+
+    @property
+    def on_host(self) -> bool:
+        """Whether it works outside JAX: no compiled function may hold its rollouts."""
+        return False
+
+
+def roll_out(
+    engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
+) -> Trajectory:
+    """Roll any engine out, compiled once for each set of shapes where it can be."""
+    if engine.on_host:
+        return engine.rollout(scene, initial, controls)
+    return _compiled(engine, scene, initial, controls)
+
+
+@eqx.filter_jit
+def _compiled(
+    engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
+) -> Trajectory:
+    return engine.rollout(scene, initial, controls)

@@ -19,6 +19,7 @@ from sainet.evaluation.metrics import (
     PushErrors,
     final_errors,
     final_pose,
+    pooled,
     push_errors,
     travel_mm,
 )
@@ -52,9 +53,19 @@ class Evaluation:
                 for (one, a), (other, b) in pairs
                 for group, part in self._parts()
                 for row in comparison_rows(
-                    (other, _select(b, part)), (one, _select(a, part)), group=group
+                    (other, b.of_pushes(part)), (one, a.of_pushes(part)), group=group
                 )
             ],
+        }
+
+    def pool(self, name: str, members: Sequence[str]) -> None:
+        """Make one model of several trainings of it, in the place of the first."""
+        found = {member: self.errors[member] for member in members}
+        whole = pooled(list(found.values()))
+        self.errors = {
+            name if model == members[0] else model: whole if model in found else errors
+            for model, errors in self.errors.items()
+            if model not in members[1:]
         }
 
     def _rows(self, errors: dict[str, PushErrors]) -> list[dict[str, Any]]:
@@ -65,7 +76,7 @@ class Evaluation:
             for name, found in errors.items()
             for row in error_rows(
                 name,
-                _select(found, part),
+                found.of_pushes(part),
                 self.travel_mm[part],
                 group=group,
                 reference=self.reference,
@@ -77,10 +88,6 @@ class Evaluation:
         owners = np.array([group or "" for group in self.groups])
         for name in sorted(set(owners)):
             yield name or None, owners == name
-
-
-def _select(errors: PushErrors, part: np.ndarray) -> PushErrors:
-    return PushErrors(**{name: value[part] for name, value in vars(errors).items()})
 
 
 def _without_intervals(row: dict[str, Any]) -> dict[str, Any]:
@@ -180,7 +187,7 @@ def _predict_all(
             rows = part[start : start + _BATCH]
             whole = np.resize(rows, min(_BATCH, len(part)))
             batch = to_batch(_rows(arrays, whole), store.info, steps=steps)
-            pose = over_devices(_predict_pose, model.dynamics, batch)
+            pose = _predict(model.dynamics, batch)
             found.append(np.asarray(pose, np.float64)[: len(rows)])
             on_pushes(model.name, len(rows))
         poses.append(np.concatenate(found))
@@ -189,6 +196,12 @@ def _predict_all(
 
 def _rows(arrays: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
     return {name: array[rows] for name, array in arrays.items()}
+
+
+def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:
+    if dynamics.on_host:  # it uses every core by itself
+        return _predict_pose(dynamics, batch)
+    return over_devices(_predict_pose, dynamics, batch)
 
 
 def _predict_pose(

@@ -1,57 +1,71 @@
-"""Means over pushes with 95 % bootstrap intervals, and paired differences."""
+"""Means over pushes with 95 % bootstrap intervals, and paired differences.
+
+A network that was trained several times has an axis of trainings before that of pushes:
+both are resampled, for another training differs as another set of test pushes does.
+"""
+
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import bootstrap
 
 RESAMPLES = 2000
 _SEED = 0
+_ENDS = (2.5, 97.5)  # percentiles
+
+Values = Float[np.ndarray, "... push quantity"]  # maybe an axis of trainings first
+Interval = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, low, high
 
 
-def mean_interval(
-    values: Float[np.ndarray, "push quantity"],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the means over pushes and the ends of their intervals."""
-    low, high = _bootstrap((values,), lambda x, axis: np.mean(x, axis=axis))
-    return values.mean(axis=0), low, high
+def mean_interval(values: Values) -> Interval:
+    """Return the means over pushes (and trainings) and the ends of their intervals."""
+    return _interval(_mean(values), _resampled(values))
 
 
-def ratio_interval(
-    above: Float[np.ndarray, "push quantity"], below: Float[np.ndarray, "push quantity"]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def ratio_interval(above: Values, below: Values) -> Interval:
     """Return the ratio of two means over the same pushes, with its interval."""
 
-    def ratio(x: np.ndarray, y: np.ndarray, axis: int) -> np.ndarray:
-        return np.mean(x, axis=axis) / np.maximum(np.mean(y, axis=axis), 1e-12)
+    def ratio(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return x / np.maximum(y, 1e-12)
 
-    low, high = _bootstrap((above, below), ratio)
-    return ratio(above, below, 0), low, high
-
-
-def difference_interval(
-    one: Float[np.ndarray, "push quantity"], other: Float[np.ndarray, "push quantity"]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the paired difference of two means, with its interval."""
-    return mean_interval(one - other)
+    drawn = ratio(_resampled(above), _resampled(below))
+    return _interval(ratio(_mean(above), _mean(below)), drawn)
 
 
-def _bootstrap(samples: tuple, statistic) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
-    """Return the ends of the intervals; NaN where a value is not known."""
-    low, high = np.full((2, samples[0].shape[1]), np.nan)
-    known = np.all([np.isfinite(sample).all(axis=0) for sample in samples], axis=0)
-    if len(samples[0]) < 2 or not known.any():  # noqa: PLR2004
-        return low, high
-    result = bootstrap(
-        tuple(sample[:, known] for sample in samples),
-        statistic,
-        axis=0,
-        paired=len(samples) > 1,
-        vectorized=True,
-        n_resamples=RESAMPLES,
-        batch=100,
-        method="percentile",
-        rng=np.random.default_rng(_SEED),
-    )
-    low[known] = result.confidence_interval.low
-    high[known] = result.confidence_interval.high
-    return low, high
+def difference_interval(one: Values, other: Values) -> Interval:
+    """Return the difference of two means over the same pushes, with its interval."""
+    drawn = _resampled(one) - _resampled(other, which=1)
+    return _interval(_mean(one) - _mean(other), drawn)
+
+
+def _mean(values: Values) -> np.ndarray:
+    return values.mean(axis=tuple(range(values.ndim - 1)))
+
+
+def _resampled(values: Values, which: int = 0) -> Float[np.ndarray, "sample quantity"]:
+    """Return the mean of each resample: of the same pushes for every set of values.
+
+    Args:
+        values: to be resampled.
+        which: of two sets of trainings, which are drawn apart.
+    """
+    whole = values.reshape(-1, *values.shape[-2:])
+    trainings, pushes, quantities = whole.shape
+    if pushes < 2:  # noqa: PLR2004  (one push tells nothing of others)
+        return np.full((RESAMPLES, quantities), np.nan)
+    by_training = np.stack([_shares(pushes, _SEED) @ one for one in whole])
+    return np.einsum("rt,trq->rq", _shares(trainings, 1 + which), by_training)
+
+
+@lru_cache(maxsize=4)
+def _shares(count: int, seed: int) -> Float[np.ndarray, "sample count"]:
+    """Return how much of each resample every one of so many things makes up."""
+    rng = np.random.default_rng((seed, count))
+    return rng.multinomial(count, [1 / count] * count, size=RESAMPLES) / count
+
+
+def _interval(
+    value: np.ndarray, drawn: Float[np.ndarray, "sample quantity"]
+) -> Interval:
+    low, high = np.percentile(drawn, _ENDS, axis=0)
+    return value, low, high

@@ -1,5 +1,6 @@
 """Errors of predicted pushes: the paper's three, and three that say more."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +11,29 @@ REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
 
 @dataclass(frozen=True)
 class PushErrors:
-    """Errors of one model, for each push and body."""
+    """Errors of one model, for each push and body; maybe of several trainings."""
 
-    pos_mm: Float[np.ndarray, "push body"]  # mean over the observed steps
-    rot_deg: Float[np.ndarray, "push body"]  # mean over the observed steps
-    final_pos_mm: Float[np.ndarray, "push body"]
-    final_rot_deg: Float[np.ndarray, "push body"]
+    pos_mm: Float[np.ndarray, "... push body"]  # mean over the observed steps
+    rot_deg: Float[np.ndarray, "... push body"]  # mean over the observed steps
+    final_pos_mm: Float[np.ndarray, "... push body"]
+    final_rot_deg: Float[np.ndarray, "... push body"]
+
+    @property
+    def trainings(self) -> int:
+        """How often the model was trained."""
+        return len(self.pos_mm) if self.pos_mm.ndim > 2 else 1  # noqa: PLR2004
+
+    def of_pushes(self, part: np.ndarray) -> "PushErrors":
+        """Return the errors of some pushes."""
+        return PushErrors(**{k: v[..., part, :] for k, v in vars(self).items()})
+
+
+def pooled(trainings: Sequence[PushErrors]) -> PushErrors:
+    """Return the errors of one model that was trained several times."""
+    names = vars(trainings[0])
+    return PushErrors(
+        **{name: np.stack([getattr(one, name) for one in trainings]) for name in names}
+    )
 
 
 def push_errors(

@@ -37,8 +37,9 @@ def error_rows(
     )
     found["trans_percent"] = _times(found["pos_mm"], 0.1 / reference)
     rows = []
-    for body in range(errors.pos_mm.shape[1]):
+    for body in range(travel_mm.shape[1]):
         row = {"model": model, "body": body + 1, "group": group, "n": len(travel_mm)}
+        row["trainings"] = errors.trainings
         for name, (mean, low, high) in found.items():
             row[name] = _number(mean[body])
             row[name + "_interval"] = [_number(low[body]), _number(high[body])]

@@ -5,7 +5,10 @@ from typing import Any
 
 from sainet.names import load_named
 
-EXPERIMENTS = {"robot-planar": "sainet.experiments.robot_planar:run"}
+EXPERIMENTS = {
+    "engine-parity": "sainet.experiments.engine_parity:run",
+    "robot-planar": "sainet.experiments.robot_planar:run",
+}
 
 
 def load_experiment(name: str) -> Callable[..., dict[str, Any]]:

@@ -1,9 +1,9 @@
 """The chain that every experiment walks: simulate, train, compare."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sainet.datasets.config import GenerateConfig
@@ -37,17 +37,51 @@ class Chain:
                 on_pushes=lambda pushes: advance(pushes, ""),
             )
 
-    def train(self, model: ModelKind, store: Store, config: FitConfig) -> FitResult:
-        """Train a network into a folder of its name."""
-        done = 0
-        with self.bar(f"Training {model.upper()}", config.iterations) as advance:
+    def train(
+        self,
+        model: ModelKind,
+        store: Store,
+        config: FitConfig,
+        *,
+        name: str | None = None,
+        assumed_engine: str = "planar",
+    ) -> FitResult:
+        """Train a network into a folder of that name, by default of its own."""
+        done, name = 0, name or model
+        with self.bar(f"Training {name.upper()}", config.iterations) as advance:
 
             def on_step(iteration: int, loss: float) -> None:
                 nonlocal done
                 advance(iteration - done, f"loss {loss:.3g}")
                 done = iteration
 
-            return fit(model, store, config, self.out / model, on_step=on_step)
+            return fit(
+                model,
+                store,
+                config,
+                self.out / name,
+                assumed_engine=assumed_engine,
+                on_step=on_step,
+            )
+
+    def train_several(
+        self, model: ModelKind, store: Store, config: FitConfig, seeds: Sequence[int]
+    ) -> list[str]:
+        """Train a network from several seeds; returns the names of their folders."""
+        names = [f"{model}-seed-{seed}" for seed in seeds]
+        for name, seed in zip(names, seeds, strict=True):
+            self.train(model, store, replace(config, seed=seed), name=name)
+        return names
+
+    def compare_trainings(
+        self, trainings: Mapping[str, Sequence[str]], store: Store
+    ) -> Evaluation:
+        """Measure the errors of physics and of networks, each the mean of trainings."""
+        networks = [name for names in trainings.values() for name in names]
+        found = self.compare(self.models(networks), store)
+        for model, names in trainings.items():
+            found.pool(model, names)
+        return found
 
     def compare(self, models: list[NamedDynamics], store: Store) -> Evaluation:
         """Measure the errors of models on the same pushes."""
@@ -57,7 +91,7 @@ class Chain:
                 models, store, on_pushes=lambda model, pushes: advance(pushes, model)
             )
 
-    def models(self) -> list[NamedDynamics]:
+    def models(self, networks: Sequence[str] = ("in", "sain")) -> list[NamedDynamics]:
         """Return the rows of the paper's tables, physics-calibrated beside them."""
-        networks = [str(self.out / name) for name in ("in", "sain")]
-        return [load_dynamics(n) for n in ("physics", "physics-calibrated", *networks)]
+        folders = [str(self.out / name) for name in networks]
+        return [load_dynamics(n) for n in ("physics", "physics-calibrated", *folders)]

@@ -29,6 +29,11 @@ class AbstractDynamics(eqx.Module):
     so that two advances equal one long one.
     """
 
+    @property
+    def on_host(self) -> bool:
+        """Whether an engine in it works outside JAX: then only parts are compiled."""
+        return False
+
     @abstractmethod
     def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
         """Return the carry of a push that starts at a state."""
@@ -47,6 +52,11 @@ class PhysicsDynamics(AbstractDynamics):
     """An engine alone."""
 
     engine: AbstractEngine
+
+    @property
+    def on_host(self) -> bool:
+        """Whether the engine works outside JAX."""
+        return self.engine.on_host
 
     def begin(self, scene: Scene, state: State) -> State:
         """Start at the state."""
@@ -100,6 +110,11 @@ class SimulatorAugmented(AbstractDynamics):
 
     network: InteractionNetwork
     engine: AbstractEngine
+
+    @property
+    def on_host(self) -> bool:
+        """Whether the engine works outside JAX."""
+        return self.engine.on_host
 
     def begin(self, scene: Scene, state: State) -> HybridCarry:
         """Start both predictions at the state (eq. 2: s-bar0 = s-hat0 = s0)."""
@@ -156,6 +171,7 @@ def _path_to_frame(motion: Array, frame: PushFrame) -> Array:
     return jax.vmap(motion_to_frame, in_axes=(1, None), out_axes=1)(motion, frame)
 
 
+@eqx.filter_jit
 def _correct(
     network: InteractionNetwork,
     scene: Scene,
@@ -202,9 +218,19 @@ def predict(
     return jax.tree.map(lambda x: x[0], _predict(dynamics, *batch))
 
 
-@eqx.filter_jit
 def _predict(
+    dynamics: AbstractDynamics, scene: Scene, initial: State, controls: Controls
+) -> Trajectory:
+    if dynamics.on_host:
+        return _roll(dynamics, scene, initial, controls)
+    return _compiled(dynamics, scene, initial, controls)
+
+
+def _roll(
     dynamics: AbstractDynamics, scene: Scene, initial: State, controls: Controls
 ) -> Trajectory:
     carry = dynamics.begin(scene, initial)
     return dynamics.advance(scene, carry, controls)[1]
+
+
+_compiled = eqx.filter_jit(_roll)

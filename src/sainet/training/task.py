@@ -18,6 +18,7 @@ from sainet.training.statistics import feature_scales, loss_weights
 from sainet.training.step import FitState, first_state
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
+_ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
 
 
 @dataclass(frozen=True)
@@ -79,12 +80,15 @@ def check_data(task: Task) -> None:
 
 def settings(task: Task) -> dict[str, Any]:
     """Return what decides the weights, as JSON values."""
+    config = asdict(task.config)
+    for name in _ONLY_WATCHES:
+        del config[name]
     return {
         "command": "train",
         "model": task.model,
         "assumed_engine": task.assumed_engine,
         "data": task.store.content,
-        **asdict(task.config),
+        **config,
     }
 
 

@@ -155,8 +155,10 @@ def _lines(
             for metric in metrics
             for body in bodies
         )
-        count = next(iter(by_body.values())).get("n")
-        lines.append(Line(group, model, labels[model], count, cells))
+        any_row = next(iter(by_body.values()))
+        trainings = any_row.get("trainings") or 1
+        label = labels[model] + (f" (mean of {trainings})" if trainings > 1 else "")
+        lines.append(Line(group, model, label, any_row.get("n"), cells))
     # Stable: groups stay together, models keep the order in which they were given.
     order = {line.group: rank for rank, line in reversed(list(enumerate(lines)))}
     return sorted(lines, key=lambda line: order[line.group])

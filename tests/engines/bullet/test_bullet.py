@@ -50,13 +50,6 @@ def test_other_processes_give_the_same_bits():
         assert same_bits(alone, rows(together, part))
 
 
-def test_a_rollout_maps_over_any_axis():
-    scene, start, controls = pushed(GenerateConfig(disks=2, pushes=4), 4, 40)
-    engine = make_engine("bullet")
-    mapped = jax.vmap(engine.rollout)(scene, start, controls).states
-    assert same_bits(mapped, engine.rollout(scene, start, controls).states)
-
-
 def test_a_friction_field_slows_each_disk_where_it_is():
     """Two disks far apart coast through fields that are constant where each is."""
     scene = make_scene(np.ones((1, 2)), np.full((1, 2), 0.05), table=0.1)

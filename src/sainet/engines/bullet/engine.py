@@ -2,9 +2,8 @@
 
 import sys
 from importlib.util import find_spec
-from typing import Any
+from typing import TYPE_CHECKING
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
@@ -14,14 +13,18 @@ from sainet.errors import MissingExtra
 from sainet.pushes import Controls, ForceControls, PathControls
 from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
 
+if TYPE_CHECKING:
+    from sainet.engines.bullet.world import Job
+
 _NEWEST_PYTHON = (3, 11)  # that PyBullet has wheels for
 
 
 class BulletEngine(AbstractEngine):
     """The engine of the paper, in DIRECT mode.
 
-    It works on the host and outside JAX: a rollout may be part of a compiled function,
-    but has no gradient. The batch is shared out to a process for each core.
+    It works on the host and has no gradient. (Within a compiled function it would have
+    to be called back: with several CPU devices JAX then waits for itself.) The batch is
+    shared out to a process for each core.
     """
 
     def __check_init__(self) -> None:
@@ -29,53 +32,45 @@ class BulletEngine(AbstractEngine):
         if find_spec("pybullet") is None:
             raise MissingExtra(_how_to_install())
 
+    @property
+    def on_host(self) -> bool:
+        """It is."""
+        return True
+
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls."""
-        batch, steps = scene.batch_shape, controls.steps
-        shapes = (
-            jax.ShapeDtypeStruct((*batch, steps, scene.body_count, 6), jnp.float32),
-            jax.ShapeDtypeStruct((*batch, steps, 4), jnp.float32),
-        )
-        motion, pusher = jax.pure_callback(
-            _HostRollout(scene, controls),
-            shapes,
-            _arrays(scene, initial, controls),
-            vmap_method="broadcast_all",
+        from sainet.engines.bullet.pool import roll_everywhere
+
+        batch = scene.batch_shape
+        moved = roll_everywhere(_jobs(scene, initial, controls))
+        motion, pusher = (
+            jnp.asarray(part.reshape(*batch, *part.shape[1:])) for part in moved
         )
         return Trajectory(unpack_motion(motion, pusher[..., 0:2], pusher[..., 2:4]))
 
 
-class _HostRollout:
-    """Rolls a batch of plain arrays out; holds what is static."""
+def _jobs(scene: Scene, initial: State, controls: Controls) -> list["Job"]:
+    """Return each push of a batch as plain numbers."""
+    from sainet.engines.bullet.world import Driven, Job
 
-    def __init__(self, scene: Scene, controls: Controls) -> None:
-        self._time_step = float(scene.time_step)
-        self._drive = (
-            (float(controls.pusher_mass), float(controls.damping))
-            if isinstance(controls, ForceControls)
-            else None
+    axes = len(scene.batch_shape)
+    arrays = _arrays(scene, initial, controls)
+    rows = {
+        name: np.asarray(x, np.float64).reshape(-1, *x.shape[axes:])
+        for name, x in arrays.items()
+    }
+    driven = None
+    if isinstance(controls, ForceControls):
+        driven = Driven(float(controls.pusher_mass), float(controls.damping))
+    return [
+        Job(
+            **{name: x[row] for name, x in rows.items() if name not in _FIELD},
+            field=tuple(rows[n][row] for n in _FIELD) if "wave" in rows else None,
+            driven=driven,
+            time_step=float(scene.time_step),
         )
-
-    def __call__(self, arrays: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-        from sainet.engines.bullet.pool import roll_everywhere
-        from sainet.engines.bullet.world import Driven, Job
-
-        values = {name: np.asarray(x, np.float64) for name, x in arrays.items()}
-        batch = values["mass"].shape[:-1]
-        flat = {n: x.reshape(-1, *x.shape[len(batch) :]) for n, x in values.items()}
-        driven = None if self._drive is None else Driven(*self._drive)
-        jobs = [
-            Job(
-                **{n: x[row] for n, x in flat.items() if n not in _FIELD},
-                field=tuple(flat[n][row] for n in _FIELD) if "wave" in flat else None,
-                driven=driven,
-                time_step=self._time_step,
-            )
-            for row in range(len(flat["mass"]))
-        ]
-        moved = roll_everywhere(jobs)
-        motion, pusher = (part.reshape(*batch, *part.shape[1:]) for part in moved)
-        return motion, pusher
+        for row in range(len(rows["mass"]))
+    ]
 
 
 _FIELD = ("wave", "phase", "amplitude")
