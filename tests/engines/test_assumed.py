@@ -5,10 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from contracts.worlds import pushed, roll
+from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
+from sainet.engines.base import roll_out
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import UnknownName
 from sainet.scene import FrictionField
@@ -60,10 +61,10 @@ def test_calibrated_knows_masses_and_radii_but_no_friction():
 def test_rolls_out_in_the_assumed_scene():
     scene, start, controls = pushed(GenerateConfig(pushes=3), 0, 20)
     wrapped = AssumedProperties(PlanarEngine())
-    found = roll(wrapped, scene, start, controls).states
-    wanted = roll(PlanarEngine(), wrapped.assume(scene), start, controls).states
+    found = roll_out(wrapped, scene, start, controls).states
+    wanted = roll_out(PlanarEngine(), wrapped.assume(scene), start, controls).states
     np.testing.assert_allclose(found.position, wanted.position, atol=1e-7)
-    true = roll(PlanarEngine(), scene, start, controls).states
+    true = roll_out(PlanarEngine(), scene, start, controls).states
     assert np.abs(found.position - true.position).max() > 1e-4
 
 

@@ -10,11 +10,11 @@ from contracts.worlds import (
     free_scenes,
     over_time,
     pushed,
-    roll,
     rows,
 )
 from engines.naive import Body, World
 from sainet.datasets.config import GenerateConfig
+from sainet.engines.base import roll_out
 from sainet.engines.planar import engine as planar
 from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
 from sainet.engines.planar.engine import PlanarEngine
@@ -71,7 +71,7 @@ def test_engine_agrees_with_the_slow_reference(setup, bodies):
     config = GenerateConfig(setup=setup, disks=bodies, pushes=2)
     for seed in (0, 1):
         whole = pushed(config, seed, STEPS)
-        states = roll(PlanarEngine(), *whole).states
+        states = roll_out(PlanarEngine(), *whole).states
         for row in range(2):
             one = [rows(tree, slice(row, row + 1)) for tree in whole]
             position, angle = naive_path(*one)
@@ -81,7 +81,7 @@ def test_engine_agrees_with_the_slow_reference(setup, bodies):
 
 def test_collisions_agree_with_the_slow_reference():
     scene, start = free_scenes(np.random.default_rng(4), 6, 3)
-    states = roll(PlanarEngine(), scene, start, far_away(6, STEPS)).states
+    states = roll_out(PlanarEngine(), scene, start, far_away(6, STEPS)).states
     assert np.asarray(pair_gaps(over_time(scene, STEPS), states)).min() < 1e-4
     for row in range(6):
         one = [rows(tree, slice(row, row + 1)) for tree in (scene, start)]
@@ -95,14 +95,14 @@ def test_collisions_agree_with_the_slow_reference():
 def test_both_solvers_agree(monkeypatch, bodies, setup):
     """Close pairs where all pairs are affordable, and the other way round."""
     whole = pushed(GenerateConfig(setup=setup, disks=bodies, pushes=32), 6, 80)
-    as_chosen = roll(PlanarEngine(), *whole).states
+    as_chosen = roll_out(PlanarEngine(), *whole).states
     few = contact_budget(bodies + 1) < bodies * (bodies + 1) // 2
     if few:
         monkeypatch.setattr(planar, "solve_close_pairs", planar.solve_all_pairs)
     else:
         monkeypatch.setattr(planar, "solve_all_pairs", solve_close_pairs)
     # Other settings than above, or the compiled rollout would be used again.
-    other = roll(PlanarEngine(recovery=0.0800001), *whole).states
+    other = roll_out(PlanarEngine(recovery=0.0800001), *whole).states
     np.testing.assert_allclose(other.position, as_chosen.position, atol=1e-5)
     np.testing.assert_allclose(other.angle, as_chosen.angle, atol=2e-4)
 
@@ -116,7 +116,7 @@ def test_more_sweeps_keep_five_disks_from_sinking_in():
     scene, *push = pushed(config, 1, 80)
     deepest = []
     for sweeps in (10, 80):
-        states = roll(PlanarEngine(sweeps=sweeps), scene, *push).states
+        states = roll_out(PlanarEngine(sweeps=sweeps), scene, *push).states
         scenes = over_time(scene, 80)
         disks = np.asarray(pair_gaps(scenes, states)).min()
         deepest.append(-min(disks, np.asarray(pusher_gaps(scenes, states)).min()))
@@ -127,7 +127,7 @@ def test_more_sweeps_keep_five_disks_from_sinking_in():
 def test_a_step_is_the_first_of_a_rollout():
     scene, start, controls = pushed(GenerateConfig(pushes=8), 2, STEPS)
     engine = PlanarEngine()
-    rolled = roll(engine, scene, start, controls).states
+    rolled = roll_out(engine, scene, start, controls).states
     stepped = eqx.filter_jit(engine.step)(
         scene, start, controls, controls.position[:, 0]
     )
@@ -140,7 +140,7 @@ def test_pressure_at_the_rim_stops_a_spin_in_two_thirds_of_the_angle():
     start = eqx.tree_at(lambda s: s.velocity, start, jnp.zeros((4, 1, 2)))
     start = eqx.tree_at(lambda s: s.spin, start, jnp.full((4, 1), 20.0))
     turned = [
-        np.asarray(roll(engine, scene, start, far_away(4, 240)).final.angle)
+        np.asarray(roll_out(engine, scene, start, far_away(4, 240)).final.angle)
         for engine in (PlanarEngine(), PlanarEngine(pressure_radius_ratio=1.0))
     ]
     np.testing.assert_allclose(turned[1] / turned[0], 2 / 3, rtol=0.02)
@@ -156,7 +156,7 @@ def test_a_friction_field_multiplies_the_friction_of_the_table():
     )
     higher = eqx.tree_at(lambda s: s.table_friction, scene, jnp.full(4, 0.15))
     found, wanted = (
-        roll(PlanarEngine(), one, start, far_away(4, 60)).final
+        roll_out(PlanarEngine(), one, start, far_away(4, 60)).final
         for one in (rough, higher)
     )
     np.testing.assert_allclose(found.position, wanted.position, atol=1e-6)

@@ -10,9 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from contracts.worlds import far_away, make_scene, moving, pushed, roll, rows
+from contracts.worlds import far_away, make_scene, moving, pushed, rows
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
+from sainet.engines.base import roll_out
 from sainet.errors import MissingExtra
 from sainet.scene import GRAVITY, FrictionField
 from support import require
@@ -33,20 +34,20 @@ def test_a_push_is_the_same_bits_after_any_others(setup):
     engine = make_engine("bullet")
     some = pushed(GenerateConfig(setup=setup, disks=2, pushes=4), 1, 60)
     others = pushed(GenerateConfig(disks=3, pushes=6), 2, 40)
-    before = roll(engine, *some).states
-    roll(engine, *others)
-    assert same_bits(roll(engine, *some).states, before)
+    before = roll_out(engine, *some).states
+    roll_out(engine, *others)
+    assert same_bits(roll_out(engine, *some).states, before)
     # The other way round, within one batch.
-    backwards = roll(engine, *rows(some, slice(None, None, -1))).states
+    backwards = roll_out(engine, *rows(some, slice(None, None, -1))).states
     assert same_bits(rows(backwards, slice(None, None, -1)), before)
 
 
 def test_other_processes_give_the_same_bits():
     many = pushed(GenerateConfig(disks=2, pushes=24), 3, 60)
-    together = roll(make_engine("bullet"), *many).states
+    together = roll_out(make_engine("bullet"), *many).states
     for row in (0, 13, 23):
         part = slice(row, row + 1)
-        alone = roll(make_engine("bullet"), *rows(many, part)).states
+        alone = roll_out(make_engine("bullet"), *rows(many, part)).states
         assert same_bits(alone, rows(together, part))
 
 
@@ -63,7 +64,7 @@ def test_a_friction_field_slows_each_disk_where_it_is():
         lambda s: s.friction_field, scene, field, is_leaf=lambda x: x is None
     )
     start = moving([[[0.0, 0.0], [1.0, 0.0]]], [[[0.0, 0.2], [0.0, 0.2]]])
-    final = roll(make_engine("bullet"), uneven, start, far_away(1, 240)).final
+    final = roll_out(make_engine("bullet"), uneven, start, far_away(1, 240)).final
     travel = np.asarray(final.position[0, :, 1])
     wanted = 0.2**2 / (2 * GRAVITY * 0.1 * np.array([1.5, 0.5]))
     np.testing.assert_allclose(travel, wanted, rtol=0.05)
@@ -71,7 +72,7 @@ def test_a_friction_field_slows_each_disk_where_it_is():
 
 def test_the_pusher_is_where_its_path_says():
     scene, start, controls = pushed(GenerateConfig(disks=2, pushes=4), 5, 100)
-    states = roll(make_engine("bullet"), scene, start, controls).states
+    states = roll_out(make_engine("bullet"), scene, start, controls).states
     gap = np.abs(np.asarray(states.pusher_position) - controls.position)
     assert gap.max() < 2e-6
 
