@@ -106,8 +106,8 @@ def _recorded(folder: Path) -> str:
         "## Recorded pushes (real), planar engine\n\n"
         "`sainet import mitpush-endpoints ellip1_endpoints.csv --out "
         f"{data}`; then `sainet generate {' '.join(STROKES)}` and `sainet train "
-        f"{' '.join(STROKE_TRAINING)}`, a network that has seen simulated pushes of this "
-        f"kind and none of these; then `sainet {' '.join(words)}`.\n\n{table}\n"
+        f"{' '.join(STROKE_TRAINING)}`, a network that has seen simulated pushes of "
+        f"this kind and none of these; then `sainet {' '.join(words)}`.\n\n{table}\n"
         "The contact friction of 0.25 is `mu` in a published log of the same robot and "
         "what an earlier sweep on these same pushes chose: it is no blind guess.\n\n"
         f"The same network on simulated strokes of 10 mm/s (seed 5):\n\n"
@@ -118,7 +118,8 @@ def _recorded(folder: Path) -> str:
 # One disk, strokes as long and as oblique as the recorded ones.
 _KIND = "robot --disks 1 --stroke-mm 50 --direction-deg 80 --gap-mm 1 --hold-steps 40"
 STROKES = (*_KIND.split(), "--speed-mm-s", "10", "50", "--pushes", "2000")
-STROKE_TRAINING = "sain --iterations 3000 --halve-every 750 --steps 1240".split()
+_RECIPE = "sain --iterations 3000 --halve-every 750 --steps 1240"
+STROKE_TRAINING = tuple(_RECIPE.split())
 
 
 def _stroke() -> Path:
@@ -143,8 +144,8 @@ def _parity() -> str:
         "## Planar against Bullet\n\n"
         f"`sainet {' '.join(words)}`: 200 random pushes of each setup, truth Bullet "
         "without noise, every engine with the true properties. `planar-0.67` has the "
-        "default pressure ratio; `bullet-at-45-deg` is Bullet in a scene that was turned "
-        "by 45 degrees, its answer turned back.\n\n"
+        "default pressure ratio; `bullet-at-45-deg` is Bullet in a scene that was "
+        "turned by 45 degrees, its answer turned back.\n\n"
         f"{to_markdown(_run(*words))}"
     )
 
