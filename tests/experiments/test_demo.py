@@ -10,6 +10,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 from sainet.errors import UnknownName
 from sainet.experiments import EXPERIMENTS, load_experiment
 from sainet.experiments.published import ROBOT_TWO_DISKS, published_rows
+from support import SOURCE
 from viz.test_report_browser import element, milliseconds, opened
 
 TINY = ("--pushes", "100", "--test-pushes", "6", "--iterations", "2")
@@ -49,6 +50,11 @@ def test_an_unknown_experiment_lists_the_known():
     with pytest.raises(UnknownName, match="robot-planar"):
         load_experiment("table-9")
     assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
+
+
+def test_the_help_names_every_experiment():
+    source = (SOURCE / "cli" / "reproduce.py").read_text("utf-8")
+    assert all(name in source for name in EXPERIMENTS)
 
 
 def test_published_rows_are_the_papers():

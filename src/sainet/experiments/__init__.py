@@ -5,7 +5,11 @@ from typing import Any
 
 from sainet.names import load_named
 
+_TABLES = "sainet.experiments.paper_tables"
 EXPERIMENTS = {
+    "direct-force-two-disks": f"{_TABLES}:direct_force_two_disks",
+    "direct-force-three-disks": f"{_TABLES}:direct_force_three_disks",
+    "robot-two-disks": f"{_TABLES}:robot_two_disks",
     "engine-parity": "sainet.experiments.engine_parity:run",
     "robot-planar": "sainet.experiments.robot_planar:run",
 }

@@ -65,20 +65,37 @@ class Chain:
             )
 
     def train_several(
-        self, model: ModelKind, store: Store, config: FitConfig, seeds: Sequence[int]
+        self,
+        model: ModelKind,
+        store: Store,
+        config: FitConfig,
+        seeds: Sequence[int],
+        *,
+        name: str | None = None,
+        assumed_engine: str = "planar",
     ) -> list[str]:
         """Train a network from several seeds; returns the names of their folders."""
-        names = [f"{model}-seed-{seed}" for seed in seeds]
-        for name, seed in zip(names, seeds, strict=True):
-            self.train(model, store, replace(config, seed=seed), name=name)
-        return names
+        folders = [f"{name or model}-seed-{seed}" for seed in seeds]
+        for folder, seed in zip(folders, seeds, strict=True):
+            self.train(
+                model,
+                store,
+                replace(config, seed=seed),
+                name=folder,
+                assumed_engine=assumed_engine,
+            )
+        return folders
 
     def compare_trainings(
-        self, trainings: Mapping[str, Sequence[str]], store: Store
+        self,
+        trainings: Mapping[str, Sequence[str]],
+        store: Store,
+        *,
+        engine: str = "planar",
     ) -> Evaluation:
         """Measure the errors of physics and of networks, each the mean of trainings."""
         networks = [name for names in trainings.values() for name in names]
-        found = self.compare(self.models(networks), store)
+        found = self.compare(self.models(networks, engine=engine), store)
         for model, names in trainings.items():
             found.pool(model, names)
         return found
@@ -91,7 +108,10 @@ class Chain:
                 models, store, on_pushes=lambda model, pushes: advance(pushes, model)
             )
 
-    def models(self, networks: Sequence[str] = ("in", "sain")) -> list[NamedDynamics]:
+    def models(
+        self, networks: Sequence[str] = ("in", "sain"), *, engine: str = "planar"
+    ) -> list[NamedDynamics]:
         """Return the rows of the paper's tables, physics-calibrated beside them."""
         folders = [str(self.out / name) for name in networks]
-        return [load_dynamics(n) for n in ("physics", "physics-calibrated", *folders)]
+        names = ("physics", "physics-calibrated", *folders)
+        return [load_dynamics(name, engine=engine) for name in names]

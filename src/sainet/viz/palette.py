@@ -42,6 +42,9 @@ _KNOWN = {
         ModelStyle("in", "IN", "#2a6fb5", "#6fb0ee", (7, 2)),
         ModelStyle("sain", "SAIN", "#00917a", "#35c7a8"),
         ModelStyle("sain-bullet", "SAIN around Bullet", "#5f8f2f", "#98c766", (5, 1.5)),
+        ModelStyle(
+            "sain-calibrated", "SAIN, calibrated", "#3f7f8c", "#7cc3d1", (3, 1.5)
+        ),
     )
 }
 _SPARE = (
