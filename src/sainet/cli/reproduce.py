@@ -18,8 +18,8 @@ class Reproduce:
     """Make tables again, each step once: finished ones are not run again."""
 
     experiments: Positional[tuple[str, ...]] = ()
-    """direct-force-two-disks (the paper's Table I), direct-force-three-disks (II),
-    robot-two-disks (III), all with Bullet; robot-planar; engine-parity. Default: all."""
+    """direct-force-two-disks (the paper's Table I), direct-force-three-disks (II) and
+    robot-two-disks (III), with Bullet; robot-planar; engine-parity. Default: all."""
     scale: Scale = "quick"
     """quick: minutes. paper: 4,500 pushes and 10,000 iterations."""
     out: Path = Path("runs/reproduce")
