@@ -153,6 +153,13 @@ def test_progress_adds_up(tmp_path):
 
 
 @pytest.mark.slow
+def test_disks_without_room_leave_nothing_behind(tmp_path):
+    config = GenerateConfig(disks=3, placement_deg=1.0, pushes=4, chunk_size=4)
+    with pytest.raises(BadInput, match="no room"):
+        generate(config, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_full_disk_says_so_and_goes_on_with_room(whole_store, tmp_path):
     with small_disk(tmp_path / "disk") as disk:
         process = start_generating(disk / "store")

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from sainet.datasets.config import GenerateConfig
+from sainet.datasets.sampling import chunk_generator, draw
 from sainet.datasets.schema import StoreInfo
 from sainet.datasets.simulate import simulate_chunk, store_info
 from sainet.datasets.store import Store, open_store
@@ -43,8 +44,10 @@ def generate(
 
     Raises:
         RunConflict: the folder holds something else.
-        BadInput: the disk is full.
+        BadInput: the disk is full, or a scene has no room for its disks.
     """
+    # Before anything is written: there may be no room for so many disks.
+    draw(config, chunk_generator(config.seed, 0), config.chunk_size)
     folder = open_run(
         out, {"command": "generate", **asdict(config)}, finished_by=HASHES
     )

@@ -98,7 +98,7 @@ def make_table(
             seed=_TEST_SEED,
         ),
     )
-    config = FitConfig(iterations=iterations)
+    config = FitConfig(iterations=iterations, batch_size=min(100, pushes))
     seeds = range(table.seeds if scale == "paper" else 1)
     trainings = {"in": chain.train_several("in", train, config, seeds)}
     for name, engine in AROUND.items():
