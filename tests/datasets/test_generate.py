@@ -16,6 +16,7 @@ import pytest
 
 from datasets.stores import assert_same_files, contents, small, start_generating
 from sainet.datasets import writer
+from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
 from sainet.errors import BadInput, RunConflict
