@@ -3,18 +3,21 @@
 import ctypes
 import os
 import sys
+from functools import lru_cache
 from importlib import import_module
 from typing import Any
 
 
-def _import_quietly(name: str) -> Any:  # noqa: ANN401
+@lru_cache
+def load_pybullet() -> Any:  # noqa: ANN401
+    """Return PyBullet's module, imported when it is first wanted."""
     sys.stdout.flush()
     kept = [(os.dup(file), file) for file in (1, 2)]
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
         for _, file in kept:
             os.dup2(nowhere, file)
-        module = import_module(name)
+        module = import_module("pybullet")
         ctypes.CDLL(None).fflush(None)  # it prints through C's buffer
     finally:
         for copy, file in kept:
@@ -22,6 +25,3 @@ def _import_quietly(name: str) -> Any:  # noqa: ANN401
             os.close(copy)
         os.close(nowhere)
     return module
-
-
-pybullet = _import_quietly("pybullet")

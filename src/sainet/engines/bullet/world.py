@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from sainet.engines.bullet.quiet import pybullet
+from sainet.engines.bullet.quiet import load_pybullet
 
 GRAVITY = 9.81  # m/s^2
 FEET = 4
@@ -67,7 +67,8 @@ class World:
 
     def __init__(self) -> None:
         """Connect."""
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._bullet = load_pybullet()
+        self._client = self._bullet.connect(self._bullet.DIRECT)
 
     def roll(self, job: Job) -> Moved:
         """Simulate one push."""
@@ -79,21 +80,21 @@ class World:
         for step in range(steps):
             self._vary_friction(job, motion[step])
             self._drive(job, pusher[step], job.command[step])
-            pybullet.stepSimulation(self._client)
+            self._bullet.stepSimulation(self._client)
             motion[step + 1] = self._disks(motion[step], job.time_step)
             pusher[step + 1] = self._pusher_after(pusher[step], job.time_step)
         return Moved(motion[1:], pusher[1:])
 
     def _build(self, job: Job) -> None:
         client = self._client
-        pybullet.resetSimulation(client)
-        pybullet.setPhysicsEngineParameter(
+        self._bullet.resetSimulation(client)
+        self._bullet.setPhysicsEngineParameter(
             fixedTimeStep=job.time_step,
             enableConeFriction=1,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
         )
-        pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
+        self._bullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
         # Bullet multiplies the coefficients of two surfaces: these give what is asked.
         self._root = math.sqrt(max(job.disk_friction, 1e-12))
         indices = range(len(job.mass))
@@ -104,10 +105,10 @@ class World:
     def _add_table(self, job: Job, index: int) -> int:
         """Add a plane that only this disk feels: its friction is that disk's own."""
         client = self._client
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_PLANE, physicsClientId=client
+        shape = self._bullet.createCollisionShape(
+            self._bullet.GEOM_PLANE, physicsClientId=client
         )
-        table = pybullet.createMultiBody(0, shape, physicsClientId=client)
+        table = self._bullet.createMultiBody(0, shape, physicsClientId=client)
         self._set_surface(table, job.table_friction / self._root)
         self._meet(table, _own_group(index))
         return table
@@ -116,7 +117,7 @@ class World:
         mass, radius = float(job.mass[index]), float(job.radius[index])
         x, y, angle, vx, vy, spin = map(float, job.motion[index])
         inertia = mass * radius**2
-        body = pybullet.createMultiBody(
+        body = self._bullet.createMultiBody(
             mass,
             self._disk_shape(radius, angle),
             basePosition=[x, y, 0],
@@ -125,7 +126,7 @@ class World:
         )
         self._set_surface(body, self._root, [inertia / 4, inertia / 4, inertia / 2])
         self._meet(body, _PUSHABLE | _own_group(index))
-        pybullet.resetBaseVelocity(body, [vx, vy, 0], [0, 0, spin], self._client)
+        self._bullet.resetBaseVelocity(body, [vx, vy, 0], [0, 0, spin], self._client)
         return body
 
     def _disk_shape(self, radius: float, angle: float) -> int:
@@ -134,8 +135,8 @@ class World:
         turns = [2 * math.pi * (foot + 0.5) / FEET - angle for foot in range(FEET)]
         arm = FOOT_ARM * radius
         feet = [[arm * math.cos(t), arm * math.sin(t), _FOOT_RADIUS] for t in turns]
-        return pybullet.createCollisionShapeArray(
-            shapeTypes=[pybullet.GEOM_CYLINDER] + [pybullet.GEOM_SPHERE] * FEET,
+        return self._bullet.createCollisionShapeArray(
+            shapeTypes=[self._bullet.GEOM_CYLINDER] + [self._bullet.GEOM_SPHERE] * FEET,
             radii=[radius] + [_FOOT_RADIUS] * FEET,
             halfExtents=[[0, 0, 0]] * (1 + FEET),
             lengths=[_HEIGHT] + [0] * FEET,
@@ -145,28 +146,28 @@ class World:
 
     def _add_pusher(self, job: Job) -> int:
         client, (x, y, vx, vy) = self._client, map(float, job.pusher)
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_CYLINDER,
+        shape = self._bullet.createCollisionShape(
+            self._bullet.GEOM_CYLINDER,
             radius=float(job.pusher_radius),
             height=2 * _HEIGHT,
             physicsClientId=client,
         )
         mass = _GUIDED_MASS if job.driven is None else job.driven.mass
         middle = [x, y, _CLEARANCE + _HEIGHT / 2]
-        body = pybullet.createMultiBody(
+        body = self._bullet.createMultiBody(
             mass, shape, basePosition=middle, physicsClientId=client
         )
         # Without inertia Bullet never turns it.
         self._set_surface(body, job.pusher_friction / self._root, [0, 0, 0])
         self._meet(body, _PUSHABLE)
-        pybullet.resetBaseVelocity(body, [vx, vy, 0], [0, 0, 0], client)
+        self._bullet.resetBaseVelocity(body, [vx, vy, 0], [0, 0, 0], client)
         return body
 
     def _set_surface(
         self, body: int, friction: float, inertia: list[float] | None = None
     ) -> None:
         extra = {} if inertia is None else {"localInertiaDiagonal": inertia}
-        pybullet.changeDynamics(
+        self._bullet.changeDynamics(
             body,
             -1,
             lateralFriction=friction,
@@ -181,7 +182,7 @@ class World:
         )
 
     def _meet(self, body: int, groups: int) -> None:
-        pybullet.setCollisionFilterGroupMask(body, -1, groups, groups, self._client)
+        self._bullet.setCollisionFilterGroupMask(body, -1, groups, groups, self._client)
 
     def _vary_friction(self, job: Job, motion: np.ndarray) -> None:
         if job.field is None:
@@ -190,7 +191,7 @@ class World:
         waves = np.cos(motion[:, 0:2] @ wave.T + phase).sum(axis=1)
         for table, factor in zip(self._tables, 1 + amplitude * waves, strict=True):
             friction = job.table_friction * max(factor, 0.1) / self._root
-            pybullet.changeDynamics(
+            self._bullet.changeDynamics(
                 table, -1, lateralFriction=friction, physicsClientId=self._client
             )
 
@@ -200,26 +201,28 @@ class World:
         if job.driven is None:
             vx, vy = (command - pusher[0:2]) / job.time_step
             lift = GRAVITY * job.time_step
-            pybullet.resetBaseVelocity(body, [vx, vy, lift], [0, 0, 0], client)
+            self._bullet.resetBaseVelocity(body, [vx, vy, lift], [0, 0, 0], client)
             return
         fx, fy = command - job.driven.damping * pusher[2:4]
         force = [fx, fy, job.driven.mass * GRAVITY]
-        pybullet.applyExternalForce(
-            body, -1, force, [0, 0, 0], pybullet.LINK_FRAME, physicsClientId=client
+        self._bullet.applyExternalForce(
+            body, -1, force, [0, 0, 0], self._bullet.LINK_FRAME, physicsClientId=client
         )
 
     def _disks(self, before: np.ndarray, time_step: float) -> np.ndarray:
         """Return the packed motion; velocities are what the places tell."""
         after = np.empty_like(before)
         for row, (body, old) in enumerate(zip(self._bodies, before, strict=True)):
-            (x, y, _), turn = pybullet.getBasePositionAndOrientation(body, self._client)
+            (x, y, _), turn = self._bullet.getBasePositionAndOrientation(
+                body, self._client
+            )
             angle = old[2] + _wrapped(_yaw(turn) - old[2])
             after[row, 0:3] = x, y, angle
         after[:, 3:6] = (after[:, 0:3] - before[:, 0:3]) / time_step
         return after
 
     def _pusher_after(self, before: np.ndarray, time_step: float) -> np.ndarray:
-        (x, y, _), _ = pybullet.getBasePositionAndOrientation(
+        (x, y, _), _ = self._bullet.getBasePositionAndOrientation(
             self._pusher, self._client
         )
         return np.array(
