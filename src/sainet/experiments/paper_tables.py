@@ -30,6 +30,7 @@ AROUND = {
 }
 _SIZES = {"quick": (500, 100, 300), "paper": (4500, 500, 10_000)}
 _TEST_SEED = 1
+_CHUNK = 250  # pushes
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,11 @@ def make_table(
     train = chain.simulate(
         "train",
         GenerateConfig(
-            setup=table.setup, pushes=pushes, engine="bullet", assumed_engine=around
+            setup=table.setup,
+            pushes=pushes,
+            engine="bullet",
+            assumed_engine=around,
+            chunk_size=min(_CHUNK, pushes),  # whole chunks are simulated
         ),
     )
     test = chain.simulate(
@@ -96,6 +101,7 @@ def make_table(
             pushes=tests,
             engine="bullet",
             seed=_TEST_SEED,
+            chunk_size=min(_CHUNK, tests),
         ),
     )
     config = FitConfig(iterations=iterations, batch_size=min(100, pushes))
