@@ -253,7 +253,7 @@ def test_contact_sticks_or_slips_as_coulomb_says(name):
     assert np.any(across == np.sin(angle) / 3)
     assert np.any(across != np.sin(angle) / 3)
     wanted = speed * np.stack([np.cos(angle), across], -1)
-    tolerance = TOLERANCES[name].impact * speed
+    tolerance = TOLERANCES[name].impact
     np.testing.assert_allclose(after.velocity[:, 0], wanted, atol=tolerance)
     turning = -2 * speed * across / radius
     np.testing.assert_allclose(after.spin[:, 0], turning, atol=tolerance / radius)
@@ -335,7 +335,7 @@ def test_collisions_do_not_bounce(name):
     after = np.asarray(states.velocity[:, TOLERANCES[name].impact_steps - 1])
     parting = np.sum((after[:, 1] - after[:, 0]) * normal, -1)
     assert np.median(approach) > 0.1
-    assert np.abs(parting / (approach + 0.1)).max() < TOLERANCES[name].impact
+    assert np.abs(parting).max() < TOLERANCES[name].parting
 
 
 # Symmetries.

@@ -46,7 +46,8 @@ class Tolerance:
     energy: float  # relative growth in a step
     still_energy: float  # J, of a resting disk that trembles
     momentum: float  # relative
-    impact: float  # of the speed, of velocities after an impact
+    impact: float  # m/s, of a disk that is pushed at 50 mm/s
+    parting: float  # m/s, of disks that met at up to 1 m/s
     impact_steps: int  # that an impact takes
     differentiable: bool
 
@@ -69,7 +70,8 @@ TOLERANCES = {
         energy=0.15,
         still_energy=1e-6,
         momentum=1e-3,
-        impact=0.1,
+        impact=1.5e-3,
+        parting=0.1,
         impact_steps=2,
         differentiable=False,
     ),
@@ -88,7 +90,8 @@ TOLERANCES = {
         energy=1e-5,
         still_energy=1e-11,
         momentum=1e-5,
-        impact=1e-4,
+        impact=1e-5,
+        parting=1e-5,
         impact_steps=1,
         differentiable=True,
     ),

@@ -19,7 +19,7 @@ from sainet.datasets import writer
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
-from sainet.errors import BadInput, RunConflict
+from sainet.errors import BadInput, MissingExtra, RunConflict
 
 
 @pytest.mark.slow
@@ -159,6 +159,14 @@ def test_disks_without_room_leave_nothing_behind(tmp_path):
     with pytest.raises(BadInput, match="no room"):
         generate(config, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_engine_leaves_nothing_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr("sainet.engines.bullet.engine.find_spec", lambda _: None)
+    for engines in ({"engine": "bullet"}, {"assumed_engine": ("planar", "bullet")}):
+        with pytest.raises(MissingExtra, match="needs PyBullet"):
+            generate(GenerateConfig(pushes=4, **engines), tmp_path / "out")
+        assert not (tmp_path / "out").exists()
 
 
 def test_a_full_disk_says_so_and_goes_on_with_room(whole_store, tmp_path):

@@ -7,6 +7,7 @@ from importlib.util import find_spec
 import pytest
 
 from sainet.experiments import load_experiment
+from sainet.experiments.chain import Chain
 from sainet.experiments.paper_tables import AROUND
 from sainet.experiments.published import DIRECT_FORCE_THREE_DISKS, published_rows
 from sainet.runs import read_json
@@ -20,9 +21,8 @@ def no_bar(title, total):
 
 def make(name, out):
     with ThreadPoolExecutor(1) as executor:
-        return load_experiment(name)(
-            "quick", out / name, executor=executor, say=print, bar=no_bar
-        )
+        chain = Chain(out / name, executor, print, no_bar)
+        return load_experiment(name)("quick", chain)
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """`sainet demo`."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,17 +26,14 @@ class Demo:
     def run(self) -> dict[str, Any]:
         """Run the demo."""
         use_devices(self.devices)
+        from sainet.experiments.chain import Chain
         from sainet.experiments.demo import run_demo
         from sainet.viz.tables import print_table
 
         with worker_pool(None) as pool:
-            result = run_demo(
-                self.config,
-                self.out,
-                executor=pool,
-                say=self.output.say,
-                bar=lambda title, total: progress_bar(title, total, self.output),
-            )
+            bar = partial(progress_bar, output=self.output)
+            chain = Chain(self.out, pool, self.output.say, bar)
+            result = run_demo(self.config, chain)
         print_table(result.table, self.output.console)
         self.output.say(f"Open {result.report} in a browser: it plays.")
         return {"report": str(result.report), **result.table}

@@ -1,6 +1,7 @@
 """`sainet reproduce`."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,19 +33,16 @@ class Reproduce:
         """Run the experiments one after another."""
         use_devices(self.devices)
         from sainet.experiments import EXPERIMENTS, load_experiment
+        from sainet.experiments.chain import Chain
         from sainet.viz.tables import print_table
 
         tables: dict[str, Any] = {}
+        bar = partial(progress_bar, output=self.output)
         with worker_pool(None) as pool:
             for name in self.experiments or tuple(EXPERIMENTS):
-                experiment = load_experiment(name)
-                tables[name] = experiment(
-                    self.scale,
-                    self.out / f"{name}-{self.scale}",
-                    executor=pool,
-                    say=self.output.say,
-                    bar=lambda title, total: progress_bar(title, total, self.output),
-                )
+                folder = self.out / f"{name}-{self.scale}"
+                chain = Chain(folder, pool, self.output.say, bar)
+                tables[name] = load_experiment(name)(self.scale, chain)
                 print_table(tables[name], self.output.console)
         only = next(iter(tables.values()))
         return only if len(tables) == 1 else {"experiments": tables}

@@ -19,6 +19,7 @@ from sainet.datasets.writer import (
     missing_chunks,
     write_chunk,
 )
+from sainet.engines import make_assumed_engine, make_engine
 from sainet.runs import open_run
 
 _log = logging.getLogger(__name__)
@@ -45,9 +46,9 @@ def generate(
     Raises:
         RunConflict: the folder holds something else.
         BadInput: the disk is full, or a scene has no room for its disks.
+        MissingExtra: an engine needs a package that is not installed.
     """
-    # Before anything is written: there may be no room for so many disks.
-    draw(config, chunk_generator(config.seed, 0), config.chunk_size)
+    _check_possible(config)
     folder = open_run(
         out, {"command": "generate", **asdict(config)}, finished_by=HASHES
     )
@@ -63,6 +64,14 @@ def generate(
         on_pushes(_length(info, index))
     finish(out, info)
     return open_store(out)
+
+
+def _check_possible(config: GenerateConfig) -> None:
+    """Raise before anything is written: an engine may be missing, or room for disks."""
+    make_engine(config.engine)
+    for name in config.assumed_engine:
+        make_assumed_engine(name)
+    draw(config, chunk_generator(config.seed, 0), config.chunk_size)
 
 
 def make_chunk(config: GenerateConfig, out: Path, index: int) -> int:

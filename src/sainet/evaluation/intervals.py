@@ -2,6 +2,7 @@
 
 A network that was trained several times has an axis of trainings before that of pushes:
 both are resampled, for another training differs as another set of test pushes does.
+(SciPy's `bootstrap` resamples one axis.)
 """
 
 from functools import lru_cache

@@ -16,7 +16,7 @@ EXPERIMENTS = {
 
 
 def load_experiment(name: str) -> Callable[..., dict[str, Any]]:
-    """Return the function `run` of an experiment.
+    """Return what makes the table of an experiment, given the scale and a `Chain`.
 
     Raises:
         UnknownName: no experiment has this name.

@@ -1,7 +1,5 @@
 """The whole method, small: simulate, train, compare, look."""
 
-from collections.abc import Callable
-from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ import numpy as np
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import PAPER_STEPS, Evaluation
-from sainet.experiments.chain import Bar, Chain
+from sainet.experiments.chain import Chain
 from sainet.experiments.config import DemoConfig
 from sainet.experiments.replays import build_replay, error_curves
 from sainet.models.registry import NamedDynamics
@@ -42,33 +40,23 @@ class DemoResult:
     table: dict[str, Any]
 
 
-def run_demo(
-    config: DemoConfig,
-    out: Path,
-    *,
-    executor: Executor,
-    say: Callable[[str], None],
-    bar: Bar,
-) -> DemoResult:
+def run_demo(config: DemoConfig, chain: Chain) -> DemoResult:
     """Run the chain small and write a report that plays.
 
     Args:
         config: how small.
-        out: the run folder; what is finished in it is not made again.
-        executor: of the simulation.
-        say: told what is being done.
-        bar: shows progress.
+        chain: does the steps; what is finished in its folder is not made again.
     """
+    out = chain.out
     settings = {"command": "demo", **asdict(config)}
     open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
-    chain = Chain(out, executor, say, bar)
     test = _simulate_and_train(chain, config)
     models = chain.models()
-    say("[bold]3[/] Comparing physics, IN and SAIN on pushes that none has seen.")
+    chain.say("[bold]3[/] Comparing physics, IN and SAIN on pushes that none has seen.")
     evaluation = chain.compare(models, test)
     table = evaluation.to_dict()
     write_json(out / "table.json", table)
-    say("[bold]4[/] Drawing the figures and the report.")
+    chain.say("[bold]4[/] Drawing the figures and the report.")
     report = _draw(models, test, evaluation, config, out)
     return DemoResult(write_report(report, out / REPORT), table)
 

@@ -4,9 +4,6 @@ Truth is Bullet without noise; every other engine knows the true properties. Bul
 not isotropic: no engine can be closer to it than it is to itself.
 """
 
-from collections.abc import Callable
-from concurrent.futures import Executor
-from pathlib import Path
 from typing import Any
 
 import equinox as eqx
@@ -17,7 +14,7 @@ from sainet.datasets.config import GenerateConfig, Setup
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.experiments.chain import Bar, Chain
+from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.geometry import rotate
 from sainet.models.dynamics import PhysicsDynamics
@@ -74,17 +71,9 @@ def turn_controls(controls: Controls, angle: float) -> Controls:
     return eqx.tree_at(lambda c: (c.force, c.contact_offset), controls, turned)
 
 
-def run(
-    scale: Scale,
-    out: Path,
-    *,
-    executor: Executor,
-    say: Callable[[str], None],
-    bar: Bar,
-) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Compare the engines on 200 random pushes of each setup; returns the table."""
     del scale  # the same at any
-    chain = Chain(out, executor, say, bar)
     table: dict[str, Any] = {"rows": [], "comparisons": []}
     for setup in _SETUPS:
         config = GenerateConfig(
@@ -93,7 +82,7 @@ def run(
         store = chain.simulate(setup, config)
         for row in chain.compare(_engines(), store).to_dict()["rows"]:
             table["rows"].append(row | {"group": setup})
-    write_json(out / "table.json", table)
+    write_json(chain.out / "table.json", table)
     return table
 
 

@@ -5,14 +5,12 @@ the network around three engines: Bullet (the paper's SAIN), planar (which plans
 and planar with the true masses and radii (what a user who knows the disks would pick).
 """
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sainet.datasets.config import GenerateConfig, Setup
-from sainet.experiments.chain import Bar, Chain
+from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.published import (
     DIRECT_FORCE_THREE_DISKS,
@@ -43,44 +41,34 @@ class PaperTable:
     seeds: int  # trainings of each network at paper scale
 
 
-def direct_force_two_disks(scale: Scale, out: Path, **how: Any) -> dict[str, Any]:  # noqa: ANN401
+def direct_force_two_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Make Table I again."""
     table = PaperTable("direct-force", 2, DIRECT_FORCE_TWO_DISKS, seeds=5)
-    return make_table(table, scale, out, **how)
+    return make_table(table, scale, chain)
 
 
-def direct_force_three_disks(scale: Scale, out: Path, **how: Any) -> dict[str, Any]:  # noqa: ANN401
+def direct_force_three_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Make Table II again: the networks of Table I on scenes of three disks."""
     table = PaperTable("direct-force", 3, DIRECT_FORCE_THREE_DISKS, seeds=5)
-    return make_table(table, scale, out, **how)
+    return make_table(table, scale, chain)
 
 
-def robot_two_disks(scale: Scale, out: Path, **how: Any) -> dict[str, Any]:  # noqa: ANN401
+def robot_two_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Make Table III again."""
     table = PaperTable("robot", 2, ROBOT_TWO_DISKS, seeds=5)
-    return make_table(table, scale, out, **how)
+    return make_table(table, scale, chain)
 
 
-def make_table(
-    table: PaperTable,
-    scale: Scale,
-    out: Path,
-    *,
-    executor: Executor,
-    say: Callable[[str], None],
-    bar: Bar,
-) -> dict[str, Any]:
+def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
     """Simulate, train and compare; tables of one setup share data and networks.
 
     Args:
         table: which one.
         scale: `paper` is 4,500 pushes, 500 test pushes and 10,000 iterations.
-        out: folder of the table; what is shared lies beside it.
-        executor: of the simulation.
-        say: told what is being done.
-        bar: shows progress.
+        chain: does the steps; its folder is the table's, what is shared lies beside it.
     """
-    chain = Chain(out.parent / f"{table.setup}-{scale}", executor, say, bar)
+    out = chain.out
+    chain = replace(chain, out=out.parent / f"{table.setup}-{scale}")
     pushes, tests, iterations = _SIZES[scale]
     around = tuple(AROUND.values())
     train = chain.simulate(

@@ -3,13 +3,10 @@
 The paper's Table III has Bullet for both; this is the same table on the base install.
 """
 
-from collections.abc import Callable
-from concurrent.futures import Executor
-from pathlib import Path
 from typing import Any
 
 from sainet.datasets.config import GenerateConfig
-from sainet.experiments.chain import Bar, Chain
+from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.published import ROBOT_TWO_DISKS, published_rows
 from sainet.runs import write_json
@@ -20,25 +17,14 @@ _SEEDS = {"quick": (0,), "paper": (0, 1, 2)}
 _MODELS: tuple[ModelKind, ...] = ("in", "sain")
 
 
-def run(
-    scale: Scale,
-    out: Path,
-    *,
-    executor: Executor,
-    say: Callable[[str], None],
-    bar: Bar,
-) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Simulate, train IN and SAIN, and compare them; returns the table.
 
     Args:
         scale: `paper` is 4,500 pushes, 500 test pushes, and three trainings of each
             network with 10,000 iterations.
-        out: folder; what is finished in it is not made again.
-        executor: of the simulation.
-        say: told what is being done.
-        bar: shows progress.
+        chain: does the steps; what is finished in its folder is not made again.
     """
-    chain = Chain(out, executor, say, bar)
     pushes, tests, iterations = _SIZES[scale]
     train = chain.simulate("train", GenerateConfig(pushes=pushes))
     test = chain.simulate("test", GenerateConfig(pushes=tests, seed=1))
@@ -49,5 +35,5 @@ def run(
     }
     table = chain.compare_trainings(trainings, test).to_dict()
     table["published"] = published_rows(ROBOT_TWO_DISKS)
-    write_json(out / "table.json", table)
+    write_json(chain.out / "table.json", table)
     return table

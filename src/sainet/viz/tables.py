@@ -18,7 +18,10 @@ from sainet.viz.palette import styles_of
 from sainet.viz.rows import METRICS, Cell, ErrorTable, Line, Metric, arrange
 from sainet.viz.templates import render
 
-_NOTE = "Small print: 95 % interval over pushes. Bold: the best of a column."
+_NOTE = (
+    "Small print: 95 % interval over pushes, and over trainings if there are several. "
+    "Bold: the best of a column."
+)
 # What a terminal shows side by side: means over the steps, then the rest.
 _ANY_WIDTH = 10_000  # characters
 _BLOCKS = (METRICS[:3], METRICS[3:])
