@@ -157,6 +157,7 @@ def test_a_part_is_read_as_it_was_written(whole_store):
 
 def test_xarray_sees_dimensions_and_units(whole_store):
     store = open_store(whole_store)
+    assert store.first(3).to_xarray().sizes["push"] == 3
     dataset = store.to_xarray()
     for name, variable in variables(store.info).items():
         assert dataset[name].dims == variable.dimensions

@@ -61,7 +61,7 @@ def test_markdown_rows_all_have_the_same_columns():
     assert "**0.59** / **0.53**" in rows[5]
     assert rows[6].startswith("| *Physics, published* |")
     assert "*6.27* / *5.81*" in rows[6]
-    assert "SAIN minus IN, pos, disk 1: −0.162 mm" in text
+    assert "SAIN minus IN: pos −0.162" in text
 
 
 def test_terminal_shows_columns_by_disk_or_pairs_when_narrow():

@@ -20,7 +20,9 @@ class Reproduce:
 
     experiments: Positional[tuple[str, ...]] = ()
     """direct-force-two-disks (the paper's Table I), direct-force-three-disks (II) and
-    robot-two-disks (III), with Bullet; robot-planar; engine-parity. Default: all."""
+    robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
+    regularisation and robustness with the networks of Table III; robot-planar;
+    engine-parity. Default: all."""
     scale: Scale = "quick"
     """quick: minutes. paper: 4,500 pushes and 10,000 iterations."""
     out: Path = Path("runs/reproduce")

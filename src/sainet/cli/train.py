@@ -24,6 +24,8 @@ class Train:
     """Run folder to write; the same settings go on where they stopped."""
     assumed_engine: str = "planar"
     """Engine whose stored prediction SAIN corrects, by the name in the dataset."""
+    pushes: int | None = None
+    """Pushes at the start of the dataset to train on; default: all."""
     config: FitConfig = field(default_factory=FitConfig)
     devices: int | None = None
     """CPU devices to split a batch over; default: one a core."""
@@ -37,6 +39,7 @@ class Train:
         from sainet.training.fit import fit
 
         store = open_store(self.data)
+        store = store if self.pushes is None else store.first(self.pushes)
         done = 0
         title = f"Training {self.model.upper()}"
         with progress_bar(title, self.config.iterations, self.output) as advance:

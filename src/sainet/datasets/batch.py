@@ -29,6 +29,11 @@ class PushBatch(eqx.Module):
         """The number of pushes."""
         return self.truth.shape[0]
 
+    @property
+    def is_observed(self) -> Bool[Array, " push"]:
+        """Whether anything is known of how each push went."""
+        return jnp.any(self.pose_observed | self.rate_observed, axis=-1)
+
 
 def to_batch(
     arrays: dict[str, np.ndarray],

@@ -1,7 +1,7 @@
 """Reading a store: checked when it is opened, then read in parts."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -10,7 +10,7 @@ import numpy as np
 
 from sainet.datasets.schema import FORMAT_VERSION, Kind, StoreInfo, sizes, variables
 from sainet.datasets.writer import ARRAYS, HASHES, chunk_files
-from sainet.errors import BadStore
+from sainet.errors import BadInput, BadStore
 from sainet.runs import content_hash, read_json
 
 if TYPE_CHECKING:
@@ -23,6 +23,19 @@ class Store:
 
     path: Path
     info: StoreInfo
+    is_cut: bool = False  # to its first pushes
+
+    def first(self, pushes: int) -> "Store":
+        """Return the store cut to its first pushes.
+
+        Raises:
+            BadInput: it has not as many.
+        """
+        if not 1 <= pushes <= self.info.pushes:
+            raise BadInput(f"{self.path} has {self.info.pushes} pushes, not {pushes}.")
+        if pushes == self.info.pushes:
+            return self
+        return replace(self, info=replace(self.info, pushes=pushes), is_cut=True)
 
     @cached_property
     def _group(self) -> Any:  # noqa: ANN401
@@ -35,18 +48,23 @@ class Store:
     ) -> dict[str, np.ndarray]:
         """Return some pushes of the named arrays (default: all) as NumPy arrays."""
         chosen = names or tuple(variables(self.info))
-        return {name: self._group[name][pushes] for name in chosen}
+        rows = slice(*pushes.indices(self.info.pushes))
+        return {name: self._group[name][rows] for name in chosen}
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the store as a lazy xarray dataset with dimensions and units."""
         import xarray
 
-        return xarray.open_zarr(self.path / ARRAYS, consolidated=False, chunks=None)
+        whole = xarray.open_zarr(self.path / ARRAYS, consolidated=False, chunks=None)
+        return whole.isel(push=slice(self.info.pushes))
 
     @property
     def content(self) -> str:
-        """The hash of the whole content: what a trained network's card records."""
-        return content_hash((self.path / HASHES).read_bytes())
+        """The hash of the content: what a trained network's card records."""
+        whole = content_hash((self.path / HASHES).read_bytes())
+        if not self.is_cut:
+            return whole
+        return content_hash(f"{whole} {self.info.pushes}".encode())
 
 
 def open_store(path: Path | str, *, verify: bool = True) -> Store:

@@ -10,6 +10,10 @@ EXPERIMENTS = {
     "direct-force-two-disks": f"{_TABLES}:direct_force_two_disks",
     "direct-force-three-disks": f"{_TABLES}:direct_force_three_disks",
     "robot-two-disks": f"{_TABLES}:robot_two_disks",
+    "data-efficiency": "sainet.experiments.data_efficiency:run",
+    "recurrent-or-not": "sainet.experiments.recurrent_or_not:run",
+    "regularisation": "sainet.experiments.regularisation:run",
+    "robustness": "sainet.experiments.robustness:run",
     "engine-parity": "sainet.experiments.engine_parity:run",
     "robot-planar": "sainet.experiments.robot_planar:run",
 }

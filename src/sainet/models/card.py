@@ -29,6 +29,7 @@ class Card:
     manifest: dict[str, Any]  # versions, hardware, number of devices
     final_loss: float | None = None
     features: str = "paper"
+    recurrent: bool = True  # False: of single steps; a card that lacks it is older
     format_version: int = field(default=FORMAT_VERSION)
 
     def to_dict(self) -> dict[str, Any]:
@@ -58,6 +59,7 @@ def read_card(folder: Path) -> Card:
             f"{FORMAT_VERSION}; upgrade sainet."
         )
     names = {f.name for f in fields(Card)}
+    found.setdefault("recurrent", True)
     missing = sorted(names - found.keys())
     if missing:
         raise BadCheckpoint(f"{path}: {missing[0]} is missing; train it again.")

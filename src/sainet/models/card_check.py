@@ -49,6 +49,7 @@ _FIELDS: dict[str, _Check] = {
     "weights": (_is(str), "a hash"),
     "config": (_is(dict), "an object"),
     "manifest": (_is(dict), "an object"),
+    "recurrent": (_is(bool), "true or false"),
     "final_loss": (_or_none(_is_number), "a number or null"),
 }
 

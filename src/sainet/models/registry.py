@@ -14,6 +14,7 @@ from sainet.models.dynamics import (
     PhysicsDynamics,
     SimulatorAugmented,
 )
+from sainet.models.restarted import Restarted
 
 PHYSICS = {"physics": AssumedProperties, "physics-calibrated": calibrated}
 
@@ -69,6 +70,8 @@ def load_dynamics(name: str, *, engine: str = "planar") -> NamedDynamics:
         dynamics: AbstractDynamics = LearnedDynamics(network)
     else:
         dynamics = SimulatorAugmented(network, _inner_engine(folder, card))
+    if not card.recurrent:
+        dynamics = Restarted(dynamics)
     return NamedDynamics(folder.name, dynamics, card, folder)
 
 

@@ -26,6 +26,9 @@ class FitConfig:
     metres, not for the standardised one)."""
     steps: int = 200
     """Steps of a push that are trained on; pushes of 600 steps, say, need 600."""
+    recurrent: bool = True
+    """Train on whole pushes; otherwise on single steps, each from the true state (the
+    paper's figure 2c)."""
     seed: int = 0
     """Of the first weights and of the order of the pushes."""
     weight_position: float = 1.0

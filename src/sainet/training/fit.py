@@ -151,7 +151,8 @@ def _make_validation(
     part = slice(task.training_pushes, task.store.info.pushes)
     arrays = task.store.read(part, task.names)
     batch = task.to_batch(arrays, task.store.info.steps)
-    loss = jax.jit(lambda network: data_loss(network, batch, weights) / kept)
+    known = int(batch.is_observed.sum())
+    loss = jax.jit(lambda network: data_loss(network, batch, weights) / known)
     return lambda network: {"validation_loss": float(loss(network))}
 
 
@@ -175,6 +176,7 @@ def _finish(
         weights=content_hash(data),
         config=asdict(task.config),
         manifest=read_json(folder.path / MANIFEST),
+        recurrent=task.config.recurrent,
         final_loss=history[-1]["loss"] if history else None,
     )
     write_json(folder.path / CARD, card.to_dict())

@@ -98,15 +98,12 @@ def make_step(
     @jax.jit
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
+        pushes = jnp.sum(batch.is_observed)
         layers = trained_layers(state.network)
-        mean = jax.tree.map(
-            lambda g, w: g / config.batch_size + 2 * config.l2 * w, summed, layers
-        )
+        mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, layers)
         updates, moments = optimizer.update(mean, state.optimizer, layers)
         network = with_layers(state.network, optax.apply_updates(layers, updates))
-        return FitState(
-            network, moments, state.iteration + 1
-        ), total / config.batch_size
+        return FitState(network, moments, state.iteration + 1), total / pushes
 
     return step
 

@@ -9,16 +9,20 @@ import numpy as np
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import simulated_name, variables
 from sainet.datasets.store import Store
+from sainet.engines import make_assumed_engine
 from sainet.errors import BadInput, BadStore
 from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.loss import LossWeights
+from sainet.training.single_steps import to_single_steps
 from sainet.training.statistics import feature_scales, loss_weights
 from sainet.training.step import FitState, first_state
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
 _ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
+# Settings that came later: a folder from before, which lacks them, had these.
+_LATER = {"recurrent": True}
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,12 @@ class Task:
         self, arrays: dict[str, np.ndarray], steps: int, simulated: str | None
     ) -> PushBatch:
         steps = min(steps, self.config.steps)
-        return to_batch(arrays, self.store.info, steps=steps, simulated=simulated)
+        batch = to_batch(arrays, self.store.info, steps=steps, simulated=simulated)
+        if self.config.recurrent:
+            return batch
+        return to_single_steps(
+            batch, make_assumed_engine(simulated) if simulated else None
+        )
 
 
 def check_data(task: Task) -> None:
@@ -76,6 +85,22 @@ def check_data(task: Task) -> None:
             f"--validation-pushes is {task.config.validation_pushes}; {path} has only "
             f"{info.pushes} pushes."
         )
+    if not task.config.recurrent:
+        _check_single_steps(task)
+
+
+def _check_single_steps(task: Task) -> None:
+    info, path = task.store.info, task.store.path
+    if info.kind != "robot" or info.engine == "recorded":
+        raise BadStore(
+            f"{path}: --no-recurrent needs simulated pushes of the robot setup, whose "
+            "state is known at every step; leave it out."
+        )
+    if task.simulated and make_assumed_engine(task.simulated).on_host:
+        raise BadInput(
+            f"--assumed-engine {task.simulated} cannot restart at every step of a "
+            "training; take planar, or leave --no-recurrent out."
+        )
 
 
 def settings(task: Task) -> dict[str, Any]:
@@ -83,6 +108,9 @@ def settings(task: Task) -> dict[str, Any]:
     config = asdict(task.config)
     for name in _ONLY_WATCHES:
         del config[name]
+    for name, before in _LATER.items():
+        if config[name] == before:
+            del config[name]
     return {
         "command": "train",
         "model": task.model,

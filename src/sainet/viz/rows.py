@@ -119,7 +119,7 @@ def arrange(
         bodies=bodies,
         lines=tuple(_mark_best(_lines(ours, used, bodies, labels))),
         published=tuple(filter(_has_numbers, _lines(theirs, used, bodies, labels))),
-        comparisons=tuple(_sentence(each, labels) for each in _worth_saying(result)),
+        comparisons=_sentences(_worth_saying(result), labels),
     )
 
 
@@ -203,18 +203,36 @@ def _is_best(cell: Cell, column: Sequence[Cell]) -> bool:
     return least is not None and cell.text == least.text
 
 
-def _sentence(comparison: Mapping[str, Any], labels: Mapping[str, str]) -> str:
-    """Say by how much one model differs from another, and where."""
-    key = str(comparison["metric"])
+def _sentences(
+    comparisons: Sequence[Mapping[str, Any]], labels: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Say by how much each model differs from another, a sentence for each pair."""
+    pairs: dict[tuple[str, str, str], dict[str, list[Mapping[str, Any]]]] = {}
+    for each in comparisons:
+        names = (str(each[side]) for side in ("model", "against"))
+        place = str(each.get("group") or ""), *names
+        found = pairs.setdefault(place, {})  # type: ignore[arg-type]
+        found.setdefault(str(each["metric"]), []).append(each)
+    return tuple(
+        (f"{group}: " if group else "")
+        + f"{labels.get(model, model)} minus {labels.get(against, against)}: "
+        + "; ".join(_amounts(key, rows) for key, rows in metrics.items())
+        for (group, model, against), metrics in pairs.items()
+    )
+
+
+def _amounts(key: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the differences of one metric, disk by disk as in a line of the table."""
     metric = next((m for m in METRICS if m.key == key), Metric(key, key, ""))
-    pair = [str(comparison[side]) for side in ("model", "against")]
-    subject = " minus ".join(labels.get(name, name) for name in pair)
-    group = comparison.get("group")
-    where = f"disk {comparison['body']}" + (f", {group}" if group else "")
-    amount = f"{_signed(comparison['difference'])} {metric.unit}".strip()
-    low, high = comparison.get("interval") or (None, None)
+    ordered = sorted(rows, key=lambda row: int(row["body"]))
+    amounts = " / ".join(_difference(row) for row in ordered)
+    return f"{metric.name} {amounts} {metric.unit}".strip()
+
+
+def _difference(row: Mapping[str, Any]) -> str:
+    low, high = row.get("interval") or (None, None)
     interval = f" [{_signed(low)}, {_signed(high)}]" if low is not None else ""
-    return f"{subject}, {metric.name}, {where}: {amount}{interval}"
+    return _signed(row["difference"]) + interval
 
 
 def _signed(value: object) -> str:

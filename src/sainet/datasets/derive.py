@@ -1,0 +1,40 @@
+"""Datasets made from others: pushes picked, or what is known of them changed."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sainet.datasets.store import Store, open_store
+from sainet.datasets.writer import HASHES, write_store
+from sainet.runs import open_run
+
+Arrays = dict[str, np.ndarray]
+
+
+def derive(
+    store: Store,
+    out: Path,
+    settings: dict[str, Any],
+    change: Callable[[Arrays], Arrays],
+) -> Store:
+    """Write what a function makes of a whole dataset, once.
+
+    Args:
+        store: read whole into memory.
+        out: the run folder.
+        settings: what the function does, as JSON values: they and the content of the
+            store decide whether a folder holds the same already.
+        change: returns the same arrays, changed or with fewer pushes.
+
+    Raises:
+        RunConflict: the folder holds something else.
+    """
+    told = {"command": "derive", "data": store.content, **settings}
+    folder = open_run(out, told, finished_by=HASHES)
+    if not folder.is_finished:
+        arrays = change(store.read(slice(None)))
+        write_store(out, replace(store.info, pushes=len(arrays["mass"])), arrays)
+    return open_store(out)

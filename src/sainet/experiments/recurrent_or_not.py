@@ -1,0 +1,29 @@
+"""Trained on whole pushes or on single steps: the paper's figure 2d against 2c.
+
+A network of single steps, and the engine in it, restart at every step: in training
+from the true state, in prediction from the predicted one.
+"""
+
+from typing import Any
+
+from sainet.experiments.chain import Chain
+from sainet.experiments.config import Scale
+from sainet.experiments.paper_setup import paper_setup
+from sainet.runs import write_json
+
+SEEDS = {"quick": range(1), "paper": range(3)}
+NETWORKS = ("in", "sain")
+SINGLE = "single-steps"
+
+
+def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+    """Train IN and SAIN both ways on the robot setup; returns the table."""
+    setup = paper_setup("robot", scale, chain)
+    trainings = {name: setup.train(name, SEEDS[scale]) for name in NETWORKS}
+    for name in NETWORKS:
+        trainings[f"{name}-{SINGLE}"] = setup.train(
+            name, SEEDS[scale], form=SINGLE, recurrent=False
+        )
+    table = setup.compare(trainings, setup.test_pushes())
+    write_json(chain.out / "table.json", table)
+    return table

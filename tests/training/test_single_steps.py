@@ -1,0 +1,170 @@
+"""The non-recurrent form: cut into single steps, trained, and started again."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from contracts.worlds import engine
+from models.samples import Glide, network, pushes
+from sainet.datasets.batch import to_batch
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate
+from sainet.errors import BadInput, BadStore
+from sainet.models.card import read_card
+from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.models.registry import load_dynamics
+from sainet.models.restarted import Restarted
+from sainet.scene import pack_motion
+from sainet.training.batch import predict_batch, to_target
+from sainet.training.config import FitConfig
+from sainet.training.fit import fit
+from sainet.training.single_steps import to_single_steps
+from sainet.training.step import make_step
+from sainet.training.task import Task, begin, settings
+from training.stores import info_of, made_up, quiet_store, write
+
+CONFIG = FitConfig(
+    iterations=60, batch_size=8, log_every=5, learning_rate=3e-3, recurrent=False
+)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return quiet_store(tmp_path_factory.getbasetemp())
+
+
+@pytest.fixture(scope="module")
+def quiet(store):
+    """Pushes whose truth is what the planar engine says of them, exactly."""
+    return to_batch(store.read(slice(0, 6)), store.info)
+
+
+@pytest.fixture(scope="module")
+def trained(store, tmp_path_factory):
+    return fit("sain", store, CONFIG, tmp_path_factory.mktemp("single") / "out")
+
+
+def test_an_engine_that_restarts_at_the_truth_stays_on_it(quiet):
+    steps = to_single_steps(quiet, engine("planar"))
+    assert steps.size == quiet.size * quiet.truth.shape[1]
+    assert steps.truth.shape[1] == 1
+    np.testing.assert_allclose(steps.simulated, steps.truth, atol=3e-5)
+    moved = np.asarray(steps.truth[:, 0] - pack_motion(steps.initial))
+    assert np.abs(moved[..., :2]).max() > 1e-4
+
+
+def test_a_step_ends_where_the_next_one_begins(quiet):
+    steps = to_single_steps(quiet, None)
+    shape = quiet.truth.shape
+    before = np.asarray(pack_motion(steps.initial)).reshape(shape)
+    after = np.asarray(steps.truth).reshape(shape)
+    np.testing.assert_array_equal(after, quiet.truth)
+    np.testing.assert_array_equal(before[:, 1:], after[:, :-1])
+    np.testing.assert_array_equal(before[:, 0], pack_motion(quiet.initial))
+    pusher = np.asarray(steps.initial.pusher_position).reshape(*shape[:2], 2)
+    np.testing.assert_array_equal(pusher[:, 1:], quiet.controls.position[:, :-1])
+    assert steps.simulated is None
+
+
+def test_an_engine_without_memory_does_not_mind_to_be_restarted():
+    world = pushes("robot", 2)
+    plain = PhysicsDynamics(engine("planar"))
+    found = predict(Restarted(plain), *world).states
+    wanted = predict(plain, *world).states
+    np.testing.assert_allclose(pack_motion(found), pack_motion(wanted), atol=1e-4)
+    np.testing.assert_allclose(found.pusher_position, wanted.pusher_position, atol=1e-6)
+
+
+def test_training_predicts_a_step_as_the_restarted_model_does():
+    # One step from the start of a push: both forms must say the same.
+    net = network("sain", "robot")
+    scene, initial, controls = pushes("robot", 2, 1)
+    model = Restarted(SimulatorAugmented(net, Glide()))
+    found = pack_motion(predict(model, scene, initial, controls).states)
+    plain = SimulatorAugmented(net, Glide())
+    wanted = pack_motion(predict(plain, scene, initial, controls).states)
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_a_restarted_model_forgets_what_came_before():
+    # Two steps: the second is a push of its own from where the first one ended.
+    model = SimulatorAugmented(network("sain", "robot"), Glide())
+    scene, initial, controls = pushes("robot", 2, 2)
+    one, two = (
+        jax.tree.map(lambda x, i=i: x[:, i : i + 1], controls) for i in range(2)
+    )
+    first = predict(model, scene, initial, one).final
+    wanted = predict(model, scene, first, two).final
+    found = predict(Restarted(model), scene, initial, controls).final
+    np.testing.assert_allclose(pack_motion(found), pack_motion(wanted), atol=1e-6)
+    open_loop = predict(model, scene, initial, controls).final
+    assert np.abs(pack_motion(open_loop) - pack_motion(found)).max() > 1e-4
+
+
+def test_a_force_cannot_restart():
+    model = Restarted(PhysicsDynamics(engine("planar")))
+    with pytest.raises(BadInput, match="a force drives"):
+        predict(model, *pushes("direct-force", 2))
+
+
+def test_a_trained_network_says_that_it_is_of_single_steps(trained):
+    found = np.array([line["loss"] for line in trained.history])
+    assert found[-2:].mean() < 0.8 * found[0]
+    assert not read_card(trained.folder).recurrent
+    model = load_dynamics(str(trained.folder)).dynamics
+    assert isinstance(model, Restarted)
+    assert isinstance(model.model, SimulatorAugmented)
+
+
+def test_the_loss_is_the_mean_over_what_was_observed(store, tmp_path):
+    task = Task("in", store, CONFIG, "planar")
+    state, weights = begin(task)
+    batch = task.to_batch(store.read(slice(0, 8), task.names), store.info.steps)
+    _, loss = make_step(CONFIG, weights)(state, batch)
+    predicted, target = predict_batch(state.network, batch), to_target(batch)
+    error = (predicted[..., :2] - target.pose[..., :2]) ** 2
+    place = float(weights.position * jnp.sum(error, axis=(-1, -2)).mean())
+    assert place < float(loss) < 50 * max(place, 1.0)
+    half = replace_observed(batch, jnp.arange(batch.size) < batch.size // 2)
+    _, some = make_step(CONFIG, weights)(begin(task)[0], half)
+    assert float(some) == pytest.approx(float(loss), rel=0.8)
+
+
+def replace_observed(batch, kept):
+    return type(batch)(
+        **{
+            **vars(batch),
+            "pose_observed": batch.pose_observed & kept[:, None],
+            "rate_observed": batch.rate_observed & kept[:, None],
+        }
+    )
+
+
+def test_folders_from_before_this_setting_still_resume(store):
+    plain = replace(CONFIG, recurrent=True)
+    assert "recurrent" not in settings(Task("in", store, plain, "planar"))
+    assert settings(Task("in", store, CONFIG, "planar"))["recurrent"] is False
+
+
+def test_what_cannot_be_cut_is_refused(store, tmp_path):
+    recorded = info_of(10, engine="recorded", seed=None)
+    pushed = GenerateConfig(setup="direct-force", pushes=4, chunk_size=4, force_steps=8)
+    for data in (
+        write(tmp_path / "recorded", recorded, made_up(recorded)),
+        generate(pushed, tmp_path / "force"),
+    ):
+        with pytest.raises(BadStore, match=f"{data.path}: --no-recurrent"):
+            fit("sain", data, CONFIG, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_bullet_cannot_restart_in_a_training(tmp_path):
+    info = info_of(10, assumed_engines=("bullet",))
+    arrays = made_up(info)
+    arrays["simulated_bullet"] = arrays.pop("simulated_planar")
+    data = write(tmp_path / "data", info, arrays)
+    with pytest.raises(BadInput, match="--assumed-engine bullet"):
+        fit("sain", data, CONFIG, tmp_path / "out", assumed_engine="bullet")
