@@ -13,7 +13,7 @@ from sainet.errors import BadCheckpoint, BadInput
 from sainet.evaluation.evaluate import evaluate
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics
-from sainet.models.registry import NamedDynamics
+from sainet.models.named import NamedDynamics
 from sainet.scene import State, Trajectory
 from training.stores import end_points_alone, info_of, made_up, quiet_store, write
 

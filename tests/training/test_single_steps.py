@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -18,12 +17,10 @@ from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
 from sainet.models.registry import load_dynamics
 from sainet.models.restarted import Restarted
 from sainet.scene import pack_motion
-from sainet.training.batch import predict_batch, to_target
 from sainet.training.config import FitConfig
 from sainet.training.fit import fit
 from sainet.training.single_steps import to_single_steps
-from sainet.training.step import make_step
-from sainet.training.task import Task, begin, settings
+from sainet.training.task import Task, settings
 from training.stores import info_of, made_up, quiet_store, write
 
 CONFIG = FitConfig(
@@ -117,30 +114,6 @@ def test_a_trained_network_says_that_it_is_of_single_steps(trained):
     model = load_dynamics(str(trained.folder)).dynamics
     assert isinstance(model, Restarted)
     assert isinstance(model.model, SimulatorAugmented)
-
-
-def test_the_loss_is_the_mean_over_what_was_observed(store, tmp_path):
-    task = Task("in", store, CONFIG, "planar")
-    state, weights = begin(task)
-    batch = task.to_batch(store.read(slice(0, 8), task.names), store.info.steps)
-    _, loss = make_step(CONFIG, weights)(state, batch)
-    predicted, target = predict_batch(state.network, batch), to_target(batch)
-    error = (predicted[..., :2] - target.pose[..., :2]) ** 2
-    place = float(weights.position * jnp.sum(error, axis=(-1, -2)).mean())
-    assert place < float(loss) < 50 * max(place, 1.0)
-    half = replace_observed(batch, jnp.arange(batch.size) < batch.size // 2)
-    _, some = make_step(CONFIG, weights)(begin(task)[0], half)
-    assert float(some) == pytest.approx(float(loss), rel=0.8)
-
-
-def replace_observed(batch, kept):
-    return type(batch)(
-        **{
-            **vars(batch),
-            "pose_observed": batch.pose_observed & kept[:, None],
-            "rate_observed": batch.rate_observed & kept[:, None],
-        }
-    )
 
 
 def test_folders_from_before_this_setting_still_resume(store):

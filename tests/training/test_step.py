@@ -54,7 +54,7 @@ def plain_gradient(net, batch):
 
 @pytest.fixture(scope="module")
 def split_gradient():
-    return jax.jit(make_gradient(WEIGHTS))
+    return make_gradient(WEIGHTS)
 
 
 @pytest.mark.parametrize("model", ["in", "sain"])

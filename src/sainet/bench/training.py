@@ -11,13 +11,11 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import jax
-from jax.sharding import NamedSharding, PartitionSpec
 
 from sainet.bench.ceiling import ceiling_gflops
 from sainet.bench.peer import TorchPeer, missing_torch, save_problem
 from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import check_runs, median_seconds
-from sainet.devices import batch_mesh
 from sainet.models.interaction import InteractionNetwork
 from sainet.training.step import make_step
 
@@ -41,8 +39,7 @@ class TrainingLoop:
         self._step = make_step(problem.config, problem.weights)
         self._batch = problem.batch
         # Where the step leaves its result; elsewhere, the second call compiles anew.
-        everywhere = NamedSharding(batch_mesh(), PartitionSpec())
-        state = jax.device_put(problem.state, everywhere)
+        state = jax.device_put(problem.state, jax.devices()[0])
         self._state, loss = self._step(state, problem.batch)
         self.first_loss = float(loss)
 

@@ -25,7 +25,7 @@ from sainet.evaluation.metrics import (
 )
 from sainet.evaluation.rows import comparison_rows, error_rows
 from sainet.models.dynamics import AbstractDynamics
-from sainet.models.registry import NamedDynamics
+from sainet.models.named import NamedDynamics
 
 PAPER_STEPS = 200
 _BATCH = 256  # pushes that are predicted at a time: one compilation for each length
@@ -122,7 +122,8 @@ def evaluate(
         )
     for model in models:
         if not force:
-            model.check_fits(store.info.kind, store.info.time_step)
+            info = store.info
+            model.check_fits(info.kind, info.time_step, info.seed)
     arrays = _read(store)
     limit = _limit(store, steps)
     parts = list(_parts_of_one_length(arrays, limit))

@@ -10,7 +10,8 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import Evaluation, evaluate
-from sainet.models.registry import NamedDynamics, load_dynamics
+from sainet.models.named import NamedDynamics
+from sainet.models.registry import PHYSICS, load_dynamics
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.fit import FitResult, fit
 
@@ -111,7 +112,12 @@ class Chain:
     def models(
         self, networks: Sequence[str] = ("in", "sain"), *, engine: str = "planar"
     ) -> list[NamedDynamics]:
-        """Return the rows of the paper's tables, physics-calibrated beside them."""
+        """Return the rows of the paper's tables, physics-calibrated beside them.
+
+        Args:
+            networks: names of folders.
+            engine: inside the physics models; networks have their own.
+        """
         folders = [str(self.out / name) for name in networks]
-        names = ("physics", "physics-calibrated", *folders)
-        return [load_dynamics(name, engine=engine) for name in names]
+        physics = [load_dynamics(name, engine=engine) for name in PHYSICS]
+        return [*physics, *map(load_dynamics, folders)]

@@ -13,7 +13,7 @@ from sainet.evaluation.evaluate import PAPER_STEPS, Evaluation
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import DemoConfig
 from sainet.experiments.replays import build_replay, error_curves
-from sainet.models.registry import NamedDynamics
+from sainet.models.named import NamedDynamics
 from sainet.runs import MANIFEST, open_run, read_json, write_json
 from sainet.training.config import FitConfig
 from sainet.viz.figures import draw_error_over_time, draw_paths

@@ -18,7 +18,7 @@ from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.geometry import rotate
 from sainet.models.dynamics import PhysicsDynamics
-from sainet.models.registry import NamedDynamics
+from sainet.models.named import NamedDynamics
 from sainet.pushes import Controls, PathControls
 from sainet.runs import write_json
 from sainet.scene import Scene, State, Trajectory

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.models.dynamics import predict
-from sainet.models.registry import NamedDynamics
+from sainet.models.named import NamedDynamics
 from sainet.scene import State, Trajectory
 from sainet.viz.replay import Replay, Track
 

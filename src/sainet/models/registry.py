@@ -1,9 +1,8 @@
-"""Models by name: physics alone, or the folder of a trained network."""
+"""Models by name: physics alone, a shipped network, or the folder of a trained one."""
 
-from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sainet.engines import ASSUMED_ENGINES, make_assumed_engine, make_engine
+from sainet.engines import ASSUMED_ENGINES, CALIBRATED, make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
 from sainet.errors import BadCheckpoint, UnknownName
 from sainet.models.card import CARD, Card
@@ -14,76 +13,74 @@ from sainet.models.dynamics import (
     PhysicsDynamics,
     SimulatorAugmented,
 )
+from sainet.models.named import NamedDynamics
 from sainet.models.restarted import Restarted
 
 PHYSICS = {"physics": AssumedProperties, "physics-calibrated": calibrated}
+PRETRAINED = Path(__file__).parent / "pretrained"
+SHIPPED = ("in", "sain", "sain-bullet")
+MODELS = (*PHYSICS, *SHIPPED)
 
 
-@dataclass(frozen=True)
-class NamedDynamics:
-    """A model, what to call it in tables, and the card of its network if any."""
-
-    name: str
-    dynamics: AbstractDynamics
-    card: Card | None = None
-    folder: Path | None = None
-
-    def check_fits(self, kind: str, time_step: float) -> None:
-        """Raise `BadCheckpoint` if the network was trained for other pushes."""
-        if self.card is None:
-            return
-        if self.card.kind != kind:
-            raise BadCheckpoint(
-                f"{self.folder}/{CARD}: kind is {self.card.kind!r}, the data's is "
-                f"{kind!r}; train a network on such pushes, or give --force."
-            )
-        if abs(self.card.time_step - time_step) > 1e-9:  # noqa: PLR2004
-            raise BadCheckpoint(
-                f"{self.folder}/{CARD}: time_step is {self.card.time_step} s, the "
-                f"data's is {time_step} s; train a network on such data, or give "
-                "--force."
-            )
-
-
-def load_dynamics(name: str, *, engine: str = "planar") -> NamedDynamics:
+def load_dynamics(
+    name: str, *, engine: str | None = None, force: bool = False
+) -> NamedDynamics:
     """Return a model by its name.
 
     Args:
-        name: `physics`, `physics-calibrated`, or the folder of a trained network.
-        engine: inside the physics models; a network's card names its own.
+        name: `physics`, `physics-calibrated`, a shipped network (`in`, `sain`,
+            `sain-bullet`), or the folder of a trained one (`./sain`, say, where a
+            shipped one has its name).
+        engine: inside the model; None is planar for physics, and for a network the
+            one that it was trained around.
+        force: put a network around another engine all the same.
 
     Raises:
         UnknownName: neither a model nor a folder has this name.
-        BadCheckpoint: the folder holds no network that can be used.
+        BadCheckpoint: the folder holds no network that can be used, or one that was
+            trained around another engine.
+        MissingExtra: the engine needs a package that is not installed.
     """
     if name in PHYSICS:
-        wrapped = PHYSICS[name](make_engine(engine))
+        wrapped = PHYSICS[name](make_engine(engine or "planar"))
         return NamedDynamics(name, PhysicsDynamics(wrapped))
-    folder = Path(name)
+    folder = PRETRAINED / name if name in SHIPPED else Path(name)
     if not folder.exists():
         raise UnknownName(
-            f"No model named {name!r}. Available: {', '.join(PHYSICS)}, or the folder "
+            f"No model named {name!r}. Available: {', '.join(MODELS)}, or the folder "
             "of a trained network."
         )
     network, card = load_network(folder)
-    if card.model == "in":
-        dynamics: AbstractDynamics = LearnedDynamics(network)
-    else:
-        dynamics = SimulatorAugmented(network, _inner_engine(folder, card))
+    if engine is not None and not force:
+        _check_engine(folder, card, engine)
+    dynamics: AbstractDynamics = LearnedDynamics(network)
+    if card.model == "sain":
+        dynamics = SimulatorAugmented(network, _inner_engine(folder, card, engine))
     if not card.recurrent:
         dynamics = Restarted(dynamics)
     return NamedDynamics(folder.name, dynamics, card, folder)
 
 
-def _inner_engine(folder: Path, card: Card) -> AssumedProperties:
-    if card.inner_engine not in ASSUMED_ENGINES:
+def _check_engine(folder: Path, card: Card, engine: str) -> None:
+    own = card.inner_engine
+    if own is not None and own.removesuffix(CALIBRATED) != engine:
         raise BadCheckpoint(
-            f"{folder / CARD}: inner_engine is {card.inner_engine!r}; this sainet has "
+            f"{folder / CARD}: inner_engine is {own!r}, not {engine!r}; leave --engine "
+            "out, train a network around that engine, or give --force."
+        )
+
+
+def _inner_engine(folder: Path, card: Card, engine: str | None) -> AssumedProperties:
+    """Return the engine with what the network was trained to believe of the scene."""
+    own = card.inner_engine
+    if own not in ASSUMED_ENGINES:
+        raise BadCheckpoint(
+            f"{folder / CARD}: inner_engine is {own!r}; this sainet has "
             f"{', '.join(sorted(ASSUMED_ENGINES))}."
         )
     assumed = card.assumed or {}
-    return replace(
-        make_assumed_engine(card.inner_engine),
+    return AssumedProperties(
+        make_engine(engine or own.removesuffix(CALIBRATED)),
         mass=_tuple(assumed.get("mass")),
         radius=_tuple(assumed.get("radius")),
         friction=assumed.get("friction"),

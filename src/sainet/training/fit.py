@@ -9,11 +9,9 @@ from typing import Any
 
 import jax
 import numpy as np
-from jax.sharding import NamedSharding, PartitionSpec
 
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
-from sainet.devices import batch_mesh
 from sainet.engines.assumed import beliefs
 from sainet.errors import Diverged
 from sainet.models.arrays import load_arrays, save_arrays
@@ -83,7 +81,7 @@ def fit(
         state = load_arrays(out / STATE, state)
     history = rewind_log(out, int(state.iteration))
     # Where the step leaves it: otherwise its first call compiles a second time.
-    state = jax.device_put(state, NamedSharding(batch_mesh(), PartitionSpec()))
+    state = jax.device_put(state, jax.devices()[0])
     state = _iterate(task, state, weights, out=out, history=history, on_step=on_step)
     _finish(task, state.network, folder, history)
     return FitResult(out, history)

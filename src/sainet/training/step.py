@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
-from jax.sharding import PartitionSpec
+from jax.sharding import NamedSharding, PartitionSpec
 from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
@@ -68,42 +68,65 @@ def data_loss(
 def make_gradient(
     weights: LossWeights,
 ) -> Callable[[InteractionNetwork, PushBatch], tuple[Array, Trained]]:
-    """Return a function that sums loss and gradient over a batch on all devices."""
+    """Return a function that sums loss and gradient over a batch on all devices.
+
+    The sums of the devices come together outside of what is compiled. XLA's own
+    all-reduce blocks a thread of the pool that the other device works with; on two
+    busy cores it was seen to wait for itself until it aborted the process.
+    """
+    everywhere = NamedSharding(batch_mesh(), PartitionSpec())
 
     def local(network: InteractionNetwork, batch: PushBatch) -> tuple[Array, Trained]:
         def loss(layers: Trained) -> Array:
             return data_loss(with_layers(network, layers), batch, weights)
 
-        return jax.lax.psum(jax.value_and_grad(loss)(trained_layers(network)), BATCH)
+        found = jax.value_and_grad(loss)(trained_layers(network))
+        return jax.tree.map(lambda x: x[None], found)
 
-    return jax.shard_map(
-        local,
-        mesh=batch_mesh(),
-        in_specs=(PartitionSpec(), PartitionSpec(BATCH)),
-        out_specs=PartitionSpec(),
-        check_vma=False,
+    parts = jax.jit(
+        jax.shard_map(
+            local,
+            mesh=batch_mesh(),
+            in_specs=(PartitionSpec(), PartitionSpec(BATCH)),
+            out_specs=PartitionSpec(BATCH),
+            check_vma=False,
+        )
     )
+    total = jax.jit(lambda parts: jax.tree.map(lambda x: jnp.sum(x, axis=0), parts))
+
+    def gradient(
+        network: InteractionNetwork, batch: PushBatch
+    ) -> tuple[Array, Trained]:
+        found = parts(jax.device_put(network, everywhere), batch)
+        return total(jax.device_put(found, jax.devices()[0]))
+
+    return gradient
 
 
 def make_step(
     config: FitConfig, weights: LossWeights
 ) -> Callable[[FitState, PushBatch], tuple[FitState, Array]]:
-    """Return the compiled gradient step.
+    """Return the gradient step; its parts are compiled.
 
-    It takes the state and a batch whose size the devices divide (see `even_batch`),
-    and returns the next state and the mean loss of the pushes, l2 left out.
+    It takes the state, on the first device, and a batch whose size the devices divide
+    (see `even_batch`), and returns the next state and the mean loss of the pushes, l2
+    left out.
     """
     optimizer, gradient = make_optimizer(config), make_gradient(weights)
 
     @jax.jit
-    def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
-        total, summed = gradient(state.network, batch)
-        pushes = jnp.sum(batch.is_observed)
+    def update(
+        state: FitState, total: Array, summed: Trained, pushes: Array
+    ) -> tuple[FitState, Array]:
         layers = trained_layers(state.network)
         mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, layers)
         updates, moments = optimizer.update(mean, state.optimizer, layers)
         network = with_layers(state.network, optax.apply_updates(layers, updates))
         return FitState(network, moments, state.iteration + 1), total / pushes
+
+    def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
+        total, summed = gradient(state.network, batch)
+        return update(state, total, summed, jnp.sum(batch.is_observed))
 
     return step
 

@@ -1,0 +1,48 @@
+"""A model with its name, and what its network may be used for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sainet.errors import BadCheckpoint
+from sainet.models.card import CARD, Card
+from sainet.models.dynamics import AbstractDynamics
+
+_SAME_TIME = 1e-9  # s
+
+
+@dataclass(frozen=True)
+class NamedDynamics:
+    """A model, what to call it in tables, and the card of its network if any."""
+
+    name: str
+    dynamics: AbstractDynamics
+    card: Card | None = None
+    folder: Path | None = None
+
+    def check_fits(self, kind: str, time_step: float, seed: int | None = None) -> None:
+        """Raise `BadCheckpoint` if the network is not for these pushes.
+
+        Args:
+            kind: of the pushes.
+            time_step: s, of the pushes.
+            seed: of simulated pushes that are to test the network; None otherwise.
+        """
+        if self.card is None:
+            return
+        path = f"{self.folder}/{CARD}"
+        if self.card.kind != kind:
+            raise BadCheckpoint(
+                f"{path}: kind is {self.card.kind!r}, the data's is "
+                f"{kind!r}; train a network on such pushes, or give --force."
+            )
+        if abs(self.card.time_step - time_step) > _SAME_TIME:
+            raise BadCheckpoint(
+                f"{path}: time_step is {self.card.time_step} s, the data's is "
+                f"{time_step} s; train a network on such data, or give --force."
+            )
+        if seed is not None and seed == self.card.data_seed:
+            raise BadCheckpoint(
+                f"{path}: data_seed is {seed}, and so is the seed of the data: the "
+                "network may have been trained on these very pushes. Generate others "
+                "with another --seed, or give --force."
+            )
