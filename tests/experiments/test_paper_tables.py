@@ -1,50 +1,103 @@
-"""The paper's tables, tiny: their rows, what they share, and what they are beside."""
+"""The experiments with Bullet, tiny: their rows, what they share and leave alone."""
 
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from importlib.util import find_spec
 
+import numpy as np
 import pytest
 
-from sainet.experiments import load_experiment
-from sainet.experiments.chain import Chain
-from sainet.experiments.paper_tables import AROUND
+from sainet.datasets.store import open_store
+from sainet.experiments.paper_setup import AROUND, NETWORKS
 from sainet.experiments.published import DIRECT_FORCE_THREE_DISKS, published_rows
+from sainet.experiments.regularisation import score
+from sainet.experiments.robustness import push_angles
 from sainet.runs import read_json
 from support import require
 
-
-@contextmanager
-def no_bar(title, total):
-    yield lambda done, note: None
+pytestmark = pytest.mark.slow
+PHYSICS = {"physics", "physics-calibrated"}
 
 
-def make(name, out):
-    with ThreadPoolExecutor(1) as executor:
-        chain = Chain(out / name, executor, print, no_bar)
-        return load_experiment(name)("quick", chain)
-
-
-@pytest.mark.slow
-def test_tables_of_one_setup_share_data_and_networks(tmp_path, monkeypatch):
+@pytest.fixture(autouse=True)
+def bullet():
     require(find_spec("pybullet"), "PyBullet is not installed")
-    tiny = {"quick": (6, 4, 2)}
-    monkeypatch.setattr("sainet.experiments.paper_tables._SIZES", tiny)
-    two = make("direct-force-two-disks", tmp_path)
-    cards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("card.json")}
-    three = make("direct-force-three-disks", tmp_path)
-    assert len(cards) == 1 + len(AROUND)
-    assert {path: path.stat().st_mtime_ns for path in cards} == cards
-    models = {"physics", "physics-calibrated", "in", *AROUND}
+
+
+def cards(folder):
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("card.json")}
+
+
+def rows_of(table):
+    return {(row["group"], row["model"], row["body"]) for row in table["rows"]}
+
+
+def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
+    two = make("direct-force-two-disks")
+    made = cards(tmp_path)
+    three = make("direct-force-three-disks")
+    assert len(made) == len(NETWORKS)
+    assert cards(tmp_path) == made
     for disks, table in ((2, two), (3, three)):
-        rows = {(row["model"], row["body"]) for row in table["rows"]}
-        assert rows == {(m, b) for m in models for b in range(1, disks + 1)}
+        models, bodies = PHYSICS | set(NETWORKS), range(1, disks + 1)
+        assert rows_of(table) == {(None, m, b) for m in models for b in bodies}
         assert all(row["n"] == 4 for row in table["rows"])
     assert three["published"] == published_rows(DIRECT_FORCE_THREE_DISKS)
     kept = read_json(tmp_path / "direct-force-three-disks" / "table.json")
     assert kept["rows"] == three["rows"]
     engines = {
         read_json(path)["model"] + " " + str(read_json(path)["inner_engine"])
-        for path in cards
+        for path in made
     }
     assert engines == {"in None", *(f"sain {engine}" for engine in AROUND.values())}
+
+
+def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
+    models = PHYSICS | {"in"}
+    efficiency = make("data-efficiency")
+    assert rows_of(efficiency) == {
+        (group, m, b) for group in ("3", "6") for m in models for b in (1, 2)
+    }
+    assert (tmp_path / "data-efficiency" / "data-efficiency.svg").is_file()
+    forms = make("recurrent-or-not")
+    both = models | {"in-single-steps"}
+    assert rows_of(forms) == {(None, m, b) for m in both for b in (1, 2)}
+    found = make("regularisation")
+    assert [choice["l2"] for choice in found["choices"]] == [1e-4, 1e-6]
+    assert all(np.isfinite(choice["score"]) for choice in found["choices"])
+    robust = make("robustness")
+    groups = {row["group"] for row in robust["rows"]}
+    assert len(groups) == 8
+    assert groups >= {"as trained", "properties ±10 %", "angles outside", "2 mm apart"}
+    assert {path.parent.name for path in cards(tmp_path)} == {
+        f"in{form}-seed-0" for form in ("", "-3-pushes", "-single-steps", "-l2-0.0001")
+    }
+    check_test_sets(tmp_path / "robot-quick")
+
+
+def check_test_sets(folder):
+    usual = open_store(folder / "test-2-disks").read(slice(None))
+    wrong = open_store(folder / "test-properties-5-percent").read(slice(None))
+    for name in ("mass", "radius"):
+        off = np.abs(wrong[name] / usual[name] - 1)
+        np.testing.assert_allclose(off, 0.05, atol=1e-5)
+    np.testing.assert_array_equal(wrong["truth"], usual["truth"])
+    contact, heading = push_angles(usual)
+    assert contact.max() <= np.pi / 3
+    assert heading.max() <= np.pi / 6 + 1e-5
+    contact, heading = push_angles(
+        open_store(folder / "test-outside-angles").read(slice(None))
+    )
+    assert ((contact > np.pi / 3) | (heading > np.pi / 6)).all()
+
+
+def test_the_score_is_the_mean_error_over_that_of_physics():
+    def row(model, pos, rot):
+        return {"model": model, "pos_mm": pos, "rot_deg": rot}
+
+    table = {
+        "rows": [
+            *(row("physics", 4.0, 1.0), row("physics", 2.0, 2.0)),
+            *(row("in", 1.0, 0.5), row("in", 1.0, 1.0)),
+            *(row("sain", 2.0, 0.5), row("sain", 0.5, 1.0)),
+        ]
+    }
+    assert score(table) == pytest.approx((0.25 + 0.5 + 0.5 + 0.25 + 4 * 0.5) / 8)

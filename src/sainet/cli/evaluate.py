@@ -2,25 +2,33 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from sainet.datasets.store import Store
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate:
     """Measure the errors of several models on the same stored pushes."""
 
-    model: tuple[str, ...] = ("physics", "physics-calibrated")
-    """physics, physics-calibrated, or folders of trained networks."""
+    model: tuple[str, ...] = ()
+    """physics, physics-calibrated, shipped networks (in, sain, sain-bullet), or folders
+    of trained ones. Default: physics and the shipped networks that fit the data."""
     data: Path
     """Dataset to predict."""
     steps: int | None = None
     """Steps to predict, 0 for all; default: 200, all of recorded pushes."""
+    engine: str | None = None
+    """Engine inside the models. Default: planar for physics, for a network the one that
+    it was trained around."""
     force: bool = False
-    """Use networks on other pushes than they were trained for."""
+    """Use networks on other pushes, and around other engines, than they were trained
+    for."""
     devices: int | None = None
     """CPU devices to split a batch over; default: one a core."""
     output: Output = field(default_factory=Output)
@@ -34,7 +42,10 @@ class Evaluate:
         from sainet.viz.tables import print_table
 
         store = open_store(self.data)
-        models = [load_dynamics(name) for name in self.model]
+        names = self.model or self._fitting(store)
+        models = [
+            load_dynamics(name, engine=self.engine, force=self.force) for name in names
+        ]
         total = store.info.pushes * len(models)
         with progress_bar("Predicting", total, self.output) as advance:
             result = evaluate(
@@ -46,3 +57,19 @@ class Evaluate:
             ).to_dict()
         print_table(result, self.output.console)
         return result
+
+    def _fitting(self, store: "Store") -> list[str]:
+        """Return physics and the shipped networks that fit the data; say why not."""
+        from sainet.errors import BadCheckpoint, MissingExtra
+        from sainet.models.registry import PHYSICS, SHIPPED, load_dynamics
+
+        names, info = list(PHYSICS), store.info
+        for name in SHIPPED:
+            try:
+                model = load_dynamics(name, engine=self.engine, force=self.force)
+                if not self.force:
+                    model.check_fits(info.kind, info.time_step, info.seed)
+                names.append(name)
+            except (BadCheckpoint, MissingExtra) as error:
+                self.output.say(f"Left out: {name}. {error}")
+        return names

@@ -75,32 +75,46 @@ def make_gradient(
     busy cores it was seen to wait for itself until it aborted the process.
     """
     everywhere = NamedSharding(batch_mesh(), PartitionSpec())
-
-    def local(network: InteractionNetwork, batch: PushBatch) -> tuple[Array, Trained]:
-        def loss(layers: Trained) -> Array:
-            return data_loss(with_layers(network, layers), batch, weights)
-
-        found = jax.value_and_grad(loss)(trained_layers(network))
-        return jax.tree.map(lambda x: x[None], found)
-
-    parts = jax.jit(
-        jax.shard_map(
-            local,
-            mesh=batch_mesh(),
-            in_specs=(PartitionSpec(), PartitionSpec(BATCH)),
-            out_specs=PartitionSpec(BATCH),
-            check_vma=False,
-        )
-    )
-    total = jax.jit(lambda parts: jax.tree.map(lambda x: jnp.sum(x, axis=0), parts))
+    weights = jax.device_put(weights, everywhere)
 
     def gradient(
         network: InteractionNetwork, batch: PushBatch
     ) -> tuple[Array, Trained]:
-        found = parts(jax.device_put(network, everywhere), batch)
-        return total(jax.device_put(found, jax.devices()[0]))
+        sums = _sum_on_devices(weights, jax.device_put(network, everywhere), batch)
+        return _total(jax.device_put(sums, jax.devices()[0]))
 
     return gradient
+
+
+# Compiled once for each set of shapes, whatever the weights, seed and settings are.
+@jax.jit
+def _sum_on_devices(
+    weights: LossWeights, network: InteractionNetwork, batch: PushBatch
+) -> tuple[Array, Trained]:
+    """Return loss and gradient of each device's part of a batch, device first."""
+    split = jax.shard_map(
+        _sum_of_part,
+        mesh=batch_mesh(),
+        in_specs=(PartitionSpec(), PartitionSpec(), PartitionSpec(BATCH)),
+        out_specs=PartitionSpec(BATCH),
+        check_vma=False,
+    )
+    return split(weights, network, batch)
+
+
+def _sum_of_part(
+    weights: LossWeights, network: InteractionNetwork, batch: PushBatch
+) -> tuple[Array, Trained]:
+    def loss(layers: Trained) -> Array:
+        return data_loss(with_layers(network, layers), batch, weights)
+
+    found = jax.value_and_grad(loss)(trained_layers(network))
+    return jax.tree.map(lambda x: x[None], found)
+
+
+@jax.jit
+def _total(sums: tuple[Array, Trained]) -> tuple[Array, Trained]:
+    return jax.tree.map(lambda x: jnp.sum(x, axis=0), sums)
 
 
 def make_step(

@@ -1,0 +1,38 @@
+"""The command that makes the shipped networks makes such networks."""
+
+import runpy
+from importlib.util import find_spec
+
+import pytest
+
+from sainet.experiments.paper_setup import paper_setup
+from sainet.models.card import CARD
+from sainet.models.registry import PRETRAINED, SHIPPED, load_dynamics
+from sainet.runs import read_json
+from support import REPOSITORY, require
+
+SAME = ("model", "kind", "time_step", "inner_engine", "truth_engine", "assumed")
+SAME += ("data_seed", "features", "recurrent", "format_version")
+SMALLER = ("iterations", "batch_size")
+
+
+@pytest.mark.slow
+def test_small_ones_have_the_cards_of_the_shipped_ones(tiny, chain, tmp_path):
+    require(find_spec("pybullet"), "PyBullet is not installed")
+    tool = runpy.run_path(str(REPOSITORY / "tools" / "pretrained.py"))
+    tool["build"](paper_setup("robot", "quick", chain), tmp_path / "into")
+    for name in SHIPPED:
+        made, shipped = (
+            read_json(folder / name / CARD)
+            for folder in (tmp_path / "into", PRETRAINED)
+        )
+        assert made.keys() == shipped.keys()
+        assert made["manifest"].keys() == shipped["manifest"].keys()
+        assert {n: made[n] for n in SAME} == {n: shipped[n] for n in SAME}
+        recipes = [
+            {k: v for k, v in card["config"].items() if k not in SMALLER}
+            for card in (made, shipped)
+        ]
+        assert recipes[0] == recipes[1]
+        assert shipped["config"]["iterations"] == 10_000
+        load_dynamics(str(tmp_path / "into" / name)).check_fits("robot", 1 / 240, 1)
