@@ -94,13 +94,32 @@ def test_train_and_evaluate(pushes, tmp_path):
     assert json.loads(done.stdout)["model"] == "sain"
     assert (out / "learning-curve.svg").stat().st_size > 0
     words = ("--model", "physics", out, "--data", pushes, "--json", "--quiet")
-    result = json.loads(sainet("evaluate", *words).stdout)
+    error = sainet("evaluate", *words, status=2).stderr
+    assert f"{out}/card.json: data_seed is 0" in error
+    assert len(error.splitlines()) == 1
+    result = json.loads(sainet("evaluate", *words, "--force").stdout)
     assert {row["model"] for row in result["rows"]} == {"physics", "net"}
     row = result["rows"][0]
     assert row["n"] == 24
     for name in ("trans_percent", "pos_mm", "rot_deg", "final_pos_mm", "final_rot_deg"):
         low, high = row[name + "_interval"]
         assert low <= row[name] <= high
+
+
+def test_shipped_networks_are_compared_where_they_fit(pushes):
+    words = ("evaluate", "--data", pushes, "--steps", 5, "--json")
+    done = sainet(*words)
+    assert {row["model"] for row in json.loads(done.stdout)["rows"]} == {
+        "physics",
+        "physics-calibrated",
+    }
+    # These pushes have the seed of those that the shipped ones were trained on.
+    for name in ("in", "sain"):
+        assert f"Left out: {name}." in done.stderr
+    words = ("evaluate", "--model", "sain", "--engine", "bullet", "--data", pushes)
+    error = sainet(*words, status=2).stderr
+    assert "inner_engine is 'planar', not 'bullet'" in error
+    assert len(error.splitlines()) == 1
 
 
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):
