@@ -9,6 +9,7 @@ import tyro
 
 import sainet
 from sainet.cli.bench import Bench
+from sainet.cli.control import Control
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
 from sainet.cli.generate import Generate
@@ -24,6 +25,7 @@ _Command = (
     | Annotated[Import, tyro.conf.subcommand("import")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Control, tyro.conf.subcommand("control")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )

@@ -1,0 +1,1 @@
+"""Closed-loop episodes, and trials of many of them."""

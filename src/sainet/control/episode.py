@@ -1,0 +1,98 @@
+"""Closed loop: observe, plan, push, observe, until solved or out of pushes."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from sainet.errors import BadScene
+from sainet.models.dynamics import AbstractDynamics
+from sainet.planning.base import AbstractPlanner, Plan
+from sainet.robots.base import AbstractRobot, Recording
+from sainet.scene import Scene, State
+from sainet.tasks.base import AbstractTask
+
+_MOST_TROUBLES = 3  # in a row
+
+
+@dataclass(frozen=True)
+class Turn:
+    """One decision and the push that followed."""
+
+    observed: State
+    plan: Plan
+    recording: Recording
+    seconds: float  # of the decision
+
+
+@dataclass
+class Episode:
+    """Everything that happened on the way to a goal."""
+
+    turns: list[Turn] = field(default_factory=list)
+    final: State | None = None  # as it was last observed
+    reason: str = "interrupted"  # why it ended
+
+
+def run_episode(
+    robot: AbstractRobot,
+    planner: AbstractPlanner,
+    dynamics: AbstractDynamics,
+    task: AbstractTask,
+    scene: Scene,
+    *,
+    pushes: int = 60,
+    episode: Episode | None = None,
+    on_turn: Callable[[Turn], None] = lambda turn: None,
+) -> Episode:
+    """Push until the task is solved.
+
+    Args:
+        robot: observes and pushes.
+        planner: decides.
+        dynamics: what it predicts with.
+        task: when is it solved.
+        scene: as model and task are to believe it.
+        pushes: after so many it is given up.
+        episode: filled while it goes on, so that an interruption leaves what there is.
+        on_turn: told of each push.
+
+    Returns:
+        The episode; its reason is `solved`, `out of pushes`, or what went wrong.
+    """
+    episode = episode or Episode()
+    troubles = 0
+    while True:
+        episode.final = state = robot.observe()
+        if bool(np.isfinite(state.position).all() and task.is_solved(scene, state)):
+            return _end(episode, "solved")
+        if len(episode.turns) == pushes:
+            return _end(episode, "out of pushes")
+        start = time.perf_counter()
+        try:
+            plan = planner.plan(dynamics, task, scene, state)
+        except BadScene as error:
+            return _end(episode, str(error))
+        seconds = time.perf_counter() - start
+        turn = Turn(state, plan, robot.push(plan.pushes[0]), seconds)
+        episode.turns.append(turn)
+        on_turn(turn)
+        troubles = troubles + 1 if turn.recording.trouble else 0
+        if troubles == _MOST_TROUBLES:
+            return _end(episode, f"{turn.recording.trouble}, {troubles} times in a row")
+
+
+def _end(episode: Episode, reason: str) -> Episode:
+    episode.reason = reason
+    return episode
+
+
+def distances(
+    task: AbstractTask, episode: Episode
+) -> Float[np.ndarray, " observation"]:
+    """Return how far the task was from solved (m) before each push and at the end."""
+    states = [turn.observed for turn in episode.turns]
+    states += [episode.final] if episode.final is not None else []
+    return np.array([float(task.distance(state)) for state in states])

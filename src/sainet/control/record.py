@@ -1,0 +1,83 @@
+"""An episode as JSON values: what was decided, predicted and seen at every push."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sainet.control.config import ControlConfig
+from sainet.control.episode import Episode, Turn
+
+if TYPE_CHECKING:
+    from sainet.control.trials import Trial
+
+_EVERY = 8  # steps between the recorded poses of a path: 1/30 s
+
+
+def record(
+    config: ControlConfig, index: int, trial: "Trial", episode: Episode
+) -> dict[str, Any]:
+    """Return the record of an episode; lengths in mm, angles in degrees.
+
+    `solved` is judged by where the disk truly is, not by where it was seen: sight is
+    as noisy as everything else.
+    """
+    task, robot = trial.task, trial.robot
+    final = 1000 * float(task.distance(robot.truth))
+    return {
+        "trial": index,
+        "model": config.model,
+        "reason": episode.reason,
+        "solved": bool(task.is_solved(robot.scene, robot.truth)),
+        "final_mm": final,
+        "pushes": len(episode.turns),
+        "decision_s": [turn.seconds for turn in episode.turns],
+        "goal_mm": _mm(task.goal),
+        "moved": task.moved,
+        "radius_mm": _mm(robot.scene.radius),
+        "pusher_radius_mm": 1000 * float(robot.scene.pusher_radius),
+        "tolerance_mm": 1000 * task.tolerance * float(robot.scene.radius[task.moved]),
+        "table_friction": float(robot.scene.table_friction),
+        "turns": [_turn(trial, turn) for turn in episode.turns],
+    }
+
+
+def _turn(trial: "Trial", turn: Turn) -> dict[str, Any]:
+    push, plan = turn.recording.push, turn.plan
+    return {
+        "contact_angle_deg": _degrees(push.contact_angle),
+        "direction_deg": _degrees(push.direction),
+        "length_mm": 1000 * float(push.length),
+        "speed_mm_s": 1000 * float(push.speed),
+        "observed": _poses(_pose(turn)),
+        "distance_mm": 1000 * float(trial.task.distance(turn.observed)),
+        "planned_pushes": len(plan.pushes),
+        "planned": _poses(plan.path[_EVERY - 1 :: _EVERY]),
+        "planned_distance_mm": 1000 * plan.distance,
+        "looked_at": plan.looked_at,
+        "is_complete": plan.is_complete,
+        "warnings": list(plan.warnings),
+        "actual": _poses(turn.recording.path[_EVERY - 1 :: _EVERY]),
+        "pusher": _mm(turn.recording.pusher[_EVERY - 1 :: _EVERY]),
+        "trouble": turn.recording.trouble,
+    }
+
+
+def _pose(turn: Turn) -> np.ndarray:
+    state = turn.observed
+    return np.concatenate(
+        [np.asarray(state.position), np.asarray(state.angle)[..., None]], axis=-1
+    )
+
+
+def _poses(pose: np.ndarray) -> list:
+    """Return x and y in mm and the angle in degrees, to a hundredth."""
+    units = np.array([1000, 1000, np.rad2deg(1)])
+    return np.round(np.asarray(pose, np.float64) * units, 2).tolist()
+
+
+def _mm(metres: object) -> list:
+    return np.round(1000 * np.asarray(metres, np.float64), 2).tolist()
+
+
+def _degrees(radians: object) -> float:
+    return float(np.rad2deg(np.asarray(radians, np.float64)))

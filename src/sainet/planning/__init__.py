@@ -1,0 +1,33 @@
+"""Search for the next pushes: the paper's greedy search, and the full tree."""
+
+from typing import TYPE_CHECKING
+
+from sainet.errors import BadInput
+from sainet.names import load_named
+
+if TYPE_CHECKING:
+    from sainet.planning.base import AbstractPlanner
+
+PLANNERS = {
+    "greedy": "sainet.planning.greedy:GreedyPlanner",
+    "tree": "sainet.planning.tree:TreePlanner",
+}
+
+
+def make_planner(name: str, *, deadline: float | None = None) -> "AbstractPlanner":
+    """Return a planner with its default settings.
+
+    Args:
+        name: of the planner.
+        deadline: s, after which the best plan so far is taken; of `tree` alone.
+
+    Raises:
+        UnknownName: no planner has this name.
+        BadInput: this planner knows no deadline.
+    """
+    planner = load_named("planner", PLANNERS, name)
+    if deadline is None:
+        return planner()
+    if name != "tree":
+        raise BadInput(f"--deadline is of --planner tree alone, not of {name}.")
+    return planner(deadline=deadline)

@@ -1,0 +1,72 @@
+"""Sequences of one length and how they end: what a search chooses among."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+from jaxtyping import Float, Int
+
+from sainet.planning.base import Found
+from sainet.planning.outcomes import Outcomes
+from sainet.scene import State
+
+Expand = Callable[[State], Outcomes]
+
+
+@dataclass(frozen=True)
+class Level:
+    """Sequences of one length, one a row, and their outcomes."""
+
+    outcomes: Outcomes  # [sequence]
+    actions: Int[np.ndarray, "sequence push"]  # indices into the grid
+
+    @property
+    def cost(self) -> Float[np.ndarray, " sequence"]:
+        """The cost at the end of each sequence; not finite counts as infinite."""
+        return np.nan_to_num(self.outcomes.cost, nan=np.inf, posinf=np.inf)
+
+    def cheapest(self, count: int) -> Int[np.ndarray, " count"]:
+        """Return the rows of least cost, the least first."""
+        return np.argsort(self.cost, kind="stable")[:count]
+
+    def grow(self, rows: Int[np.ndarray, " row"], expand: Expand) -> "Level":
+        """Return what becomes of some sequences with every push after them."""
+        states = jax.tree.map(lambda x: x[rows], self.outcomes.state)
+        return flatten(expand(states), self.actions[rows])
+
+
+def flatten(outcomes: Outcomes, parents: Int[np.ndarray, "state push"]) -> Level:
+    """Return outcomes ``[state, push]`` as sequences, one a row."""
+    states, pushes = outcomes.cost.shape
+    last = np.tile(np.arange(pushes), states)[:, None]
+    actions = np.concatenate([np.repeat(parents, pushes, axis=0), last], axis=1)
+    flat = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), outcomes)
+    return Level(flat, actions)
+
+
+def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
+    """Return the shortest sequence that solves the task, else the one of least cost.
+
+    Args:
+        levels: from short sequences to long ones.
+        is_complete: whether everything was looked at that should have been.
+    """
+    looked_at = sum(len(level.actions) for level in levels)
+    for level in levels:
+        solved = level.outcomes.solved
+        if solved.any():
+            distance = np.where(solved, level.outcomes.distance, np.inf)
+            return _found(level, int(np.argmin(distance)), looked_at, is_complete)
+    best = min(levels, key=lambda level: level.cost.min())
+    return _found(best, int(best.cheapest(1)[0]), looked_at, is_complete)
+
+
+def _found(level: Level, row: int, looked_at: int, is_complete: bool) -> Found:
+    return Found(
+        actions=tuple(int(action) for action in level.actions[row]),
+        cost=float(level.outcomes.cost[row]),
+        distance=float(level.outcomes.distance[row]),
+        looked_at=looked_at,
+        is_complete=is_complete,
+    )

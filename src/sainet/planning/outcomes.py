@@ -1,0 +1,89 @@
+"""What every push does to every state: one batched call of any dynamics model."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sainet.devices import over_devices
+from sainet.models.dynamics import AbstractDynamics
+from sainet.pushes import Push, path_controls, place_pusher, push_direction
+from sainet.scene import Scene, State, Trajectory, at_rest
+from sainet.tasks.base import AbstractTask
+
+SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
+
+
+class Outcomes(NamedTuple):
+    """Where pushes end, and what a task says of it; rest is taken for granted."""
+
+    state: State  # everything at rest
+    cost: Float[Array, "*batch"]
+    distance: Float[Array, "*batch"]  # m
+    solved: Bool[Array, "*batch"]
+
+
+def every_push(
+    dynamics: AbstractDynamics,
+    task: AbstractTask,
+    scene: Scene,
+    states: State,
+    pushes: Push,
+) -> Outcomes:
+    """Predict every push from every state, up to when everything rests.
+
+    Compiled once for each number of states, split over all devices.
+
+    Args:
+        dynamics: predicts.
+        task: judges.
+        scene: one scene, without a batch axis.
+        states: at rest, ``[state]``.
+        pushes: the actions, ``[push]``.
+
+    Returns:
+        The outcomes, ``[state, push]``, as NumPy arrays.
+    """
+    count, actions = states.angle.shape[0], pushes.length.shape[0]
+    # NumPy: a search makes many small steps, each of which JAX would dispatch.
+    rows = jax.tree.map(lambda x: np.repeat(x, actions, axis=0), states)
+    each = jax.tree.map(lambda x: np.tile(x, count), pushes)
+    shared = dynamics, task, scene
+    if dynamics.on_host:  # it uses every core by itself
+        flat = _judge(shared, rows, each)
+    else:
+        flat = over_devices(_judge, shared, rows, each)
+    flat = jax.device_get(flat)
+    return jax.tree.map(lambda x: x.reshape(count, actions, *x.shape[1:]), flat)
+
+
+def roll_pushes(
+    dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
+) -> Trajectory:
+    """Predict one push from each state; all arguments share one batch axis."""
+    start, heading = place_pusher(scene, states, pushes), push_direction(states, pushes)
+    initial = at_rest(states.position, states.angle, start)
+    controls = path_controls(
+        pushes, start, heading, steps=SETTLED_STEPS, time_step=scene.time_step
+    )
+    carry = dynamics.begin(scene, initial)
+    return dynamics.advance(scene, carry, controls)[1]
+
+
+def batch_of(scene: Scene, count: int) -> Scene:
+    """Return a scene as a batch of equal ones."""
+    return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *x.shape)), scene)
+
+
+def _judge(
+    shared: tuple[AbstractDynamics, AbstractTask, Scene], states: State, pushes: Push
+) -> Outcomes:
+    dynamics, task, scene = shared
+    scenes = batch_of(scene, states.angle.shape[0])
+    end = roll_pushes(dynamics, scenes, states, pushes).final
+    rest = at_rest(end.position, end.angle, end.pusher_position)
+    return Outcomes(
+        rest, task.cost(rest), task.distance(rest), task.is_solved(scenes, rest)
+    )

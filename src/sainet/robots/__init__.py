@@ -1,0 +1,1 @@
+"""Things that observe disks and execute pushes."""

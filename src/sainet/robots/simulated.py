@@ -1,0 +1,118 @@
+"""A robot in a simulated world: noise of motion and of sight, and a rough table."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sainet.engines.base import AbstractEngine, roll_out
+from sainet.engines.config import NoiseConfig
+from sainet.engines.noise import capture_error, friction_features, tracking_error
+from sainet.pushes import (
+    PathControls,
+    Push,
+    path_controls,
+    place_pusher,
+    push_direction,
+)
+from sainet.robots.base import AbstractRobot, Recording
+from sainet.scene import FrictionField, Scene, State, at_rest
+
+PUSH_STEPS = 200  # 48 of motion; then the pusher holds while the disks come to rest
+
+
+class SimulatedRobot(AbstractRobot):
+    """Executes pushes in an engine, with the noise of the simulated world.
+
+    Nothing simulated is real: it stands for a robot in tests and comparisons.
+    """
+
+    def __init__(
+        self,
+        engine: AbstractEngine,
+        scene: Scene,
+        state: State,
+        *,
+        noise: NoiseConfig,
+        rng: np.random.Generator,
+    ) -> None:
+        """Put the disks on the table.
+
+        Args:
+            engine: moves them.
+            scene: one scene with the true properties.
+            state: where they begin.
+            noise: sizes of the sources.
+            rng: draws the noise.
+        """
+        self._engine, self._noise, self._rng = engine, noise, rng
+        self.scene = _with_rough_table(scene, noise, rng)
+        self.truth = jax.device_get(state)
+        self._seen = self.truth
+
+    def observe(self) -> State:
+        """Return the poses as motion capture sees them; velocities are zero."""
+        bodies = self.truth.angle.shape[0]
+        error = capture_error(self._rng, (1, 1, bodies), self._noise)[0, 0]
+        self._seen = replace(
+            self.truth,
+            position=(self.truth.position + error[:, :2]).astype(np.float32),
+            angle=(self.truth.angle + error[:, 2]).astype(np.float32),
+        )
+        return self._seen
+
+    def push(self, push: Push) -> Recording:
+        """Push from where the disks were last observed."""
+        # In the engine's batches: one scene, one push.
+        scene, seen, truth, one = jax.tree.map(
+            lambda x: jnp.asarray(x)[None], (self.scene, self._seen, self.truth, push)
+        )
+        plain = eqx.tree_at(lambda s: s.friction_field, scene, None)
+        start, heading = place_pusher(plain, seen, one), push_direction(seen, one)
+        controls = path_controls(
+            one, start, heading, steps=PUSH_STEPS, time_step=scene.time_step
+        )
+        initial = at_rest(truth.position, truth.angle, start)
+        states = roll_out(self._engine, scene, initial, self._disturb(controls)).states
+        states = jax.device_get(jax.tree.map(lambda x: x[0], states))
+        path = np.concatenate([states.position, states.angle[..., None]], axis=-1)
+        before = self.truth
+        self.truth = at_rest(
+            path[-1, :, :2], path[-1, :, 2], states.pusher_position[-1]
+        )
+        return Recording(push, path, states.pusher_position, _trouble(before, path))
+
+    def _disturb(self, controls: PathControls) -> PathControls:
+        moving = np.abs(np.asarray(controls.velocity)).max(axis=-1) > 0
+        step = self.scene.time_step
+        error = tracking_error(self._rng, moving, self._noise, step)
+        return PathControls(
+            controls.position + jnp.asarray(error, jnp.float32), controls.velocity
+        )
+
+
+_STILL = 1e-4  # m
+
+
+def _trouble(before: State, path: np.ndarray) -> str | None:
+    """Say if the push was none."""
+    if not np.isfinite(path).all():
+        return "the simulated world left the finite numbers"
+    moved = np.linalg.norm(path[-1, :, :2] - before.position, axis=-1)
+    return None if moved[0] > _STILL else "disk 1 did not move"
+
+
+def _with_rough_table(
+    scene: Scene, noise: NoiseConfig, rng: np.random.Generator
+) -> Scene:
+    if not noise.friction_fraction:
+        return scene
+    features = friction_features(rng, 1, noise)
+    field = FrictionField(
+        **{k: jnp.asarray(v[0], jnp.float32) for k, v in features.items()}
+    )
+    return eqx.tree_at(
+        lambda s: s.friction_field, scene, field, is_leaf=lambda x: x is None
+    )

@@ -1,0 +1,1 @@
+"""What a robot is asked for: tasks, their costs, and goals drawn as in the paper."""

@@ -1,0 +1,48 @@
+"""The paper's task (section IV-A): push disk 1 until another disk is at its goal."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from sainet.geometry import norm
+from sainet.scene import Scene, State
+from sainet.tasks.base import AbstractTask
+
+TOLERANCE_RADII = 0.1
+ALIGNMENT = 3.0
+
+
+class PushToGoal(AbstractTask):
+    """One disk must come to a place; only disk 1 is pushed.
+
+    The cost is the paper's heuristic, ``|p_m - g| + w (1 - cos)`` with the cosine of
+    the angle between goal and moved disk as disk 1 sees them: it keeps both disks and
+    the goal on one line. (The paper adds a length and a number, w = 1.)
+    """
+
+    goal: Float[Array, " 2"]  # m
+    moved: int = eqx.field(static=True, default=1)  # index of the disk
+    tolerance: float = eqx.field(static=True, default=TOLERANCE_RADII)  # of its radius
+    alignment: float = eqx.field(static=True, default=ALIGNMENT)  # w, m
+
+    def distance(self, state: State) -> Float[Array, "*batch"]:
+        """Return the distance of the moved disk from the goal (m)."""
+        return norm(self._to_goal(state.position[..., self.moved, :]))
+
+    def cost(self, state: State) -> Float[Array, "*batch"]:
+        """Return the paper's heuristic h(p_1, p_m, g) (m)."""
+        pushed = state.position[..., 0, :]
+        ahead, wanted = (
+            state.position[..., self.moved, :] - pushed,
+            self._to_goal(pushed),
+        )
+        lengths = jnp.maximum(norm(ahead) * norm(wanted), 1e-12)
+        cosine = jnp.sum(ahead * wanted, axis=-1) / lengths
+        return self.distance(state) + self.alignment * (1 - cosine)
+
+    def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
+        """Return whether the moved disk is within its tolerance of the goal."""
+        return self.distance(state) <= self.tolerance * scene.radius[..., self.moved]
+
+    def _to_goal(self, place: Float[Array, "*batch 2"]) -> Float[Array, "*batch 2"]:
+        return jnp.broadcast_to(self.goal, place.shape) - place
