@@ -190,6 +190,6 @@ def _scene(
 def _in_a_row(radius: np.ndarray) -> State:
     """Return disks that touch, along the x axis, the first one at the origin."""
     x = np.concatenate([[0.0], np.cumsum(radius[:-1] + radius[1:])])
-    position = np.stack([x, 0 * x], axis=-1).astype(np.float32)
-    pusher = position[0] - np.array([2 * radius[0], 0], np.float32)
-    return at_rest(position, np.zeros(len(radius), np.float32), pusher)
+    position = jnp.asarray(np.stack([x, 0 * x], axis=-1), jnp.float32)
+    behind = jnp.array([-2 * radius[0], 0], jnp.float32)
+    return at_rest(position, jnp.zeros(len(radius)), behind)

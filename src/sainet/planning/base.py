@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -41,10 +42,7 @@ class AbstractPlanner(eqx.Module):
     def search(
         self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
     ) -> "Found":
-        """Return the best sequence of actions, as indices into the grid.
-
-        The state's arrays are NumPy's.
-        """
+        """Return the best sequence of actions, as indices into the grid."""
 
     def plan(
         self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
@@ -61,7 +59,6 @@ class AbstractPlanner(eqx.Module):
             BadScene: the observation is not finite, or disks lie in one another.
         """
         check_observation(scene, state)
-        state = jax.device_get(state)
         found = self.search(dynamics, task, scene, state)
         grid = jax.device_get(self.actions.pushes())
         pushes = tuple(jax.tree.map(lambda x, i=i: x[i], grid) for i in found.actions)
@@ -104,10 +101,10 @@ def predicted_path(
 ) -> Float[np.ndarray, "time body 3"]:
     """Return the poses over all pushes, every push from rest."""
     roll = roll_pushes if dynamics.on_host else _compiled_roll
-    state = jax.tree.map(lambda x: x[None], state)
+    state = jax.tree.map(lambda x: jnp.asarray(x)[None], state)
     poses = []
     for push in pushes:
-        one = jax.tree.map(lambda x: x[None], push)
+        one = jax.tree.map(lambda x: jnp.asarray(x)[None], push)
         trajectory = roll(dynamics, batch_of(scene, 1), state, one)
         states, end = trajectory.states, trajectory.final
         pose = [states.position, states.angle[..., None]]

@@ -1,6 +1,5 @@
 """The paper's search (section IV-D): greedy, with a queue and a short horizon."""
 
-from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import count
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Found
-from sainet.planning.levels import Expand, Level, choose, flatten
+from sainet.planning.levels import Level, choose, flatten
 from sainet.planning.outcomes import Outcomes, every_push
 from sainet.pushes import PushGrid
 from sainet.scene import Scene, State
@@ -22,11 +21,10 @@ _NEAR = 0.010  # m
 class GreedyPlanner(AbstractPlanner):
     """A queue of action sequences, ordered by the heuristic.
 
-    The sequence of least heuristic is taken out and its 72 continuations are predicted.
-    The one that ends nearest to the goal goes into the queue, and the sequence itself
-    goes back: should it come out again, the next nearest follows. States that the queue
-    had already are left out. The first sequence of the whole horizon that comes out is
-    the plan; so is any continuation that solves the task.
+    The sequence of least heuristic is taken out, its 72 continuations are predicted and
+    go into the queue, but for those that end where the queue has been already. The
+    first sequence of the whole horizon that comes out is the plan; so is the nearest to
+    the goal of those that solve the task.
     """
 
     actions: PushGrid = PushGrid()
@@ -46,84 +44,42 @@ class GreedyPlanner(AbstractPlanner):
 
         near = float(task.distance(state)) < _NEAR
         horizon = self.near_horizon if near else self.horizon
-        queue, levels = _Queue(self.same), []
-        queue.add(_Node((), state), float(task.cost(state)))
-        while queue:
-            cost, node = queue.pop()
-            if len(node.actions) == horizon:
-                return node.found(cost, 72 * len(levels))
-            if node.level is None:
-                if len(levels) == self.expansions:
-                    break
-                levels.append(node.expand(expand))
-                if levels[-1].outcomes.solved.any():
-                    return choose(levels)
-            queue.add_nearest_child(node, cost)
+        root = jax.tree.map(lambda x: np.asarray(x)[None], state)
+        levels = [flatten(expand(root), np.zeros((1, 0), int))]
+        queue = _Queue(self.same, np.asarray(state.position))
+        queue.add(levels[0])
+        while queue and len(levels) <= self.expansions:
+            if levels[-1].outcomes.solved.any():
+                return choose(levels)
+            level, row = queue.pop()
+            if level.actions.shape[1] == horizon:
+                return level.found(row, sum(len(v.actions) for v in levels))
+            levels.append(level.grow(np.array([row]), expand))
+            queue.add(levels[-1])
         return choose(levels, is_complete=False)
 
 
-@dataclass
-class _Node:
-    """A sequence of actions, where it ends, and what may follow it."""
-
-    actions: tuple[int, ...]
-    state: State
-    distance: float = float("inf")  # m
-    level: Level | None = None  # its continuations
-    waiting: list[int] = field(default_factory=list)  # of them, the nearest last
-
-    def expand(self, expand: Expand) -> Level:
-        """Predict every continuation and return them."""
-        alone = jax.tree.map(lambda x: x[None], self.state)
-        parent = np.array([self.actions], int).reshape(1, -1)
-        self.level = flatten(expand(alone), parent)
-        distance = np.nan_to_num(self.level.outcomes.distance, nan=np.inf)
-        nearest = np.argsort(distance, kind="stable")
-        self.waiting = [int(row) for row in nearest[::-1]]
-        return self.level
-
-    def child(self, row: int) -> "_Node":
-        assert self.level is not None
-        outcomes = self.level.outcomes
-        state = jax.tree.map(lambda x: x[row], outcomes.state)
-        return _Node((*self.actions, row), state, float(outcomes.distance[row]))
-
-    def found(self, cost: float, looked_at: int) -> Found:
-        return Found(self.actions, cost, self.distance, looked_at)
-
-
-@dataclass
 class _Queue:
     """Sequences by heuristic; knows every state that it had."""
 
-    same: float  # m
-    _heap: list[tuple[float, int, _Node]] = field(default_factory=list)
-    _seen: list[np.ndarray] = field(default_factory=list)
-    _ticket: count = field(default_factory=count)  # of equal costs, first come
+    def __init__(self, same: float, start: np.ndarray) -> None:
+        self._same, self._seen = same, start[None]  # m; [state, body, 2]
+        self._heap: list[tuple[float, int, Level, int]] = []
+        self._ticket = count()  # of equal costs, first come
 
     def __bool__(self) -> bool:
         return bool(self._heap)
 
-    def add(self, node: _Node, cost: float) -> None:
-        self._seen.append(np.asarray(node.state.position))
-        heappush(self._heap, (cost, next(self._ticket), node))
+    def add(self, level: Level) -> None:
+        """Add the sequences of a level that end at a state the queue had not."""
+        for row in level.cheapest(len(level.actions)):
+            place = np.asarray(level.outcomes.state.position[row])
+            gaps = np.linalg.norm(self._seen - place, axis=-1).max(axis=-1)
+            if np.isfinite(level.cost[row]) and gaps.min() >= self._same:
+                self._seen = np.concatenate([self._seen, place[None]])
+                cost = float(level.cost[row])
+                heappush(self._heap, (cost, next(self._ticket), level, int(row)))
 
-    def pop(self) -> tuple[float, _Node]:
-        cost, _, node = heappop(self._heap)
-        return cost, node
-
-    def add_nearest_child(self, node: _Node, cost: float) -> None:
-        """Add the nearest continuation that is new, and the node for the others."""
-        assert node.level is not None
-        while node.waiting:
-            row = node.waiting.pop()
-            child_cost = float(node.level.cost[row])
-            child = node.child(row)
-            if np.isfinite(child_cost) and not self._had(child.state):
-                self.add(child, child_cost)
-                heappush(self._heap, (cost, next(self._ticket), node))
-                return
-
-    def _had(self, state: State) -> bool:
-        gaps = np.asarray(self._seen) - state.position
-        return bool((np.linalg.norm(gaps, axis=-1).max(axis=-1) < self.same).any())
+    def pop(self) -> tuple[Level, int]:
+        """Take out the sequence of least heuristic."""
+        return heappop(self._heap)[2:]

@@ -35,6 +35,16 @@ class Level:
         states = jax.tree.map(lambda x: x[rows], self.outcomes.state)
         return flatten(expand(states), self.actions[rows])
 
+    def found(self, row: int, looked_at: int, *, is_complete: bool = True) -> Found:
+        """Return one of the sequences as what a search ends with."""
+        return Found(
+            actions=tuple(int(action) for action in self.actions[row]),
+            cost=float(self.outcomes.cost[row]),
+            distance=float(self.outcomes.distance[row]),
+            looked_at=looked_at,
+            is_complete=is_complete,
+        )
+
 
 def flatten(outcomes: Outcomes, parents: Int[np.ndarray, "state push"]) -> Level:
     """Return outcomes ``[state, push]`` as sequences, one a row."""
@@ -57,16 +67,8 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
         solved = level.outcomes.solved
         if solved.any():
             distance = np.where(solved, level.outcomes.distance, np.inf)
-            return _found(level, int(np.argmin(distance)), looked_at, is_complete)
+            return level.found(
+                int(np.argmin(distance)), looked_at, is_complete=is_complete
+            )
     best = min(levels, key=lambda level: level.cost.min())
-    return _found(best, int(best.cheapest(1)[0]), looked_at, is_complete)
-
-
-def _found(level: Level, row: int, looked_at: int, is_complete: bool) -> Found:
-    return Found(
-        actions=tuple(int(action) for action in level.actions[row]),
-        cost=float(level.outcomes.cost[row]),
-        distance=float(level.outcomes.distance[row]),
-        looked_at=looked_at,
-        is_complete=is_complete,
-    )
+    return best.found(int(best.cheapest(1)[0]), looked_at, is_complete=is_complete)

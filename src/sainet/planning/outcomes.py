@@ -52,7 +52,7 @@ def every_push(
     each = jax.tree.map(lambda x: np.tile(x, count), pushes)
     shared = dynamics, task, scene
     if dynamics.on_host:  # it uses every core by itself
-        flat = _judge(shared, rows, each)
+        flat = _judge(shared, *jax.tree.map(jnp.asarray, (rows, each)))
     else:
         flat = over_devices(_judge, shared, rows, each)
     flat = jax.device_get(flat)

@@ -38,7 +38,7 @@ class TreePlanner(AbstractPlanner):
         def expand(states: State) -> Outcomes:
             return every_push(dynamics, task, scene, states, pushes)
 
-        root = jax.tree.map(lambda x: x[None], state)
+        root = jax.tree.map(lambda x: np.asarray(x)[None], state)
         levels = [flatten(expand(root), np.zeros((1, 0), int))]
         # The most promising first pushes come first: a deadline may cut the rest.
         order = levels[0].cheapest(len(levels[0].actions))

@@ -49,7 +49,7 @@ class SimulatedRobot(AbstractRobot):
         """
         self._engine, self._noise, self._rng = engine, noise, rng
         self.scene = _with_rough_table(scene, noise, rng)
-        self.truth = jax.device_get(state)
+        self.truth = state
         self._seen = self.truth
 
     def observe(self) -> State:
@@ -58,8 +58,8 @@ class SimulatedRobot(AbstractRobot):
         error = capture_error(self._rng, (1, 1, bodies), self._noise)[0, 0]
         self._seen = replace(
             self.truth,
-            position=(self.truth.position + error[:, :2]).astype(np.float32),
-            angle=(self.truth.angle + error[:, 2]).astype(np.float32),
+            position=self.truth.position + jnp.asarray(error[:, :2], jnp.float32),
+            angle=self.truth.angle + jnp.asarray(error[:, 2], jnp.float32),
         )
         return self._seen
 
@@ -76,13 +76,12 @@ class SimulatedRobot(AbstractRobot):
         )
         initial = at_rest(truth.position, truth.angle, start)
         states = roll_out(self._engine, scene, initial, self._disturb(controls)).states
-        states = jax.device_get(jax.tree.map(lambda x: x[0], states))
+        states = jax.tree.map(lambda x: x[0], states)
         path = np.concatenate([states.position, states.angle[..., None]], axis=-1)
-        before = self.truth
-        self.truth = at_rest(
-            path[-1, :, :2], path[-1, :, 2], states.pusher_position[-1]
-        )
-        return Recording(push, path, states.pusher_position, _trouble(before, path))
+        before, end = self.truth, jax.tree.map(lambda x: x[-1], states)
+        self.truth = at_rest(end.position, end.angle, end.pusher_position)
+        pusher = np.asarray(states.pusher_position)
+        return Recording(push, path, pusher, _trouble(before, path))
 
     def _disturb(self, controls: PathControls) -> PathControls:
         moving = np.abs(np.asarray(controls.velocity)).max(axis=-1) > 0

@@ -4,8 +4,6 @@ from typing import Literal
 
 import numpy as np
 
-from sainet.errors import BadInput
-
 GoalKind = Literal["easy", "hard"]
 # Angles from the axis of the disks, to either side (degrees).
 ANGLES: dict[GoalKind, tuple[float, float]] = {
@@ -35,8 +33,6 @@ def draw_goal(
         axis: angle that the goal's angle is measured from, rad.
         radius: of that disk, m.
     """
-    if kind not in ANGLES:
-        raise BadInput(f"--goals is {kind}; it must be one of {', '.join(ANGLES)}.")
     rng = np.random.default_rng([_STREAM, seed, trial, list(ANGLES).index(kind)])
     low, high = np.deg2rad(ANGLES[kind])
     angle = axis + rng.uniform(low, high) * rng.choice([-1, 1])

@@ -1,0 +1,106 @@
+"""The closed loop, with robots that do odd things and a planner that costs nothing."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from models.samples import Glide
+from planning.scenes import goal_ahead, scene, touching
+from sainet.control.episode import Episode, distances, run_episode
+from sainet.errors import BadScene
+from sainet.models.dynamics import PhysicsDynamics
+from sainet.planning.base import AbstractPlanner, Found, Plan
+from sainet.pushes import PushGrid
+from sainet.robots.base import AbstractRobot, Recording
+
+TASK = goal_ahead(0.05)
+MODEL = PhysicsDynamics(Glide())
+
+
+class Ahead(AbstractPlanner):
+    """Always takes the first push, and predicts nothing."""
+
+    actions: PushGrid = PushGrid()
+
+    def search(self, dynamics, task, scene, state):
+        return Found((0,), 0.0, 0.0, 1)
+
+    def plan(self, dynamics, task, scene, state):
+        if not np.isfinite(state.position).all():
+            raise BadScene("observation: position holds NaN")
+        push = jax.tree.map(lambda x: x[0], self.actions.pushes())
+        return Plan((push,), np.zeros((1, 2, 3)), 0.0, 0.0, 1)
+
+
+class Rail(AbstractRobot):
+    """Disk 2 moves straight to the goal, so much with each push."""
+
+    def __init__(self, step=0.01, trouble=None, stops_after=None):
+        self.state, self.step, self.trouble = touching(), step, trouble
+        self.left = stops_after
+
+    def observe(self):
+        return self.state
+
+    def push(self, push):
+        if self.left is not None:
+            self.left -= 1
+            if self.left < 0:
+                raise KeyboardInterrupt
+        way = TASK.goal - touching().position[1]
+        way = way / jnp.linalg.norm(way) * self.step
+        moved = self.state.position.at[1].add(way)
+        self.state = eqx.tree_at(lambda s: s.position, self.state, moved)
+        return Recording(push, np.zeros((1, 2, 3)), np.zeros((1, 2)), self.trouble)
+
+
+def run(robot, **settings):
+    return run_episode(robot, Ahead(), MODEL, TASK, scene(), **settings)
+
+
+def test_it_ends_when_the_task_is_solved():
+    told = []
+    episode = run(Rail(), on_turn=told.append)
+    # 50 mm in steps of 10 mm; within 5.9 mm after the fifth.
+    assert (episode.reason, len(episode.turns)) == ("solved", 5)
+    assert told == episode.turns
+    np.testing.assert_allclose(
+        distances(TASK, episode), [0.05, 0.04, 0.03, 0.02, 0.01, 0.0], atol=1e-6
+    )
+    assert all(turn.seconds >= 0 for turn in episode.turns)
+
+
+def test_a_goal_that_is_reached_already_needs_no_push():
+    robot = Rail()
+    robot.state = eqx.tree_at(
+        lambda s: s.position, robot.state, robot.state.position.at[1].set(TASK.goal)
+    )
+    assert run(robot).turns == []
+
+
+def test_it_is_given_up_after_so_many_pushes():
+    episode = run(Rail(step=0.001), pushes=7)
+    assert (episode.reason, len(episode.turns)) == ("out of pushes", 7)
+
+
+def test_a_robot_in_trouble_is_not_asked_for_ever():
+    episode = run(Rail(step=0.0, trouble="disk 1 did not move"))
+    assert episode.reason == "disk 1 did not move, 3 times in a row"
+    assert len(episode.turns) == 3
+
+
+def test_an_observation_that_is_no_number_ends_it_with_the_reason():
+    robot = Rail(step=float("nan"))
+    episode = run(robot)
+    assert "NaN" in episode.reason
+    assert len(episode.turns) == 1
+
+
+def test_an_interruption_keeps_what_there_is():
+    episode = Episode()
+    with pytest.raises(KeyboardInterrupt):
+        run(Rail(stops_after=2), episode=episode)
+    assert episode.reason == "interrupted"
+    assert len(episode.turns) == 2

@@ -1,0 +1,149 @@
+"""Trials: seeded, resumable, the same goals for every model."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.test_checkpoint import write_network
+from sainet.control import trials
+from sainet.control.config import ControlConfig
+from sainet.control.summary import paired_test, summarise
+from sainet.control.trials import episode_file, make_trial, run_trials
+from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+
+CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    out = tmp_path_factory.mktemp("control") / "out"
+    return out, run_trials(CONFIG, out)
+
+
+def without_times(record):
+    return {k: v for k, v in record.items() if k != "decision_s"}
+
+
+def test_an_episode_is_a_file_that_tells_everything(done):
+    out, records = done
+    assert [r["trial"] for r in records] == [0, 1]
+    for index, record in enumerate(records):
+        assert json.loads(episode_file(out, index).read_text()) == record
+        assert record["reason"] == "out of pushes"
+        assert len(record["turns"]) == record["pushes"] == 2
+        turn = record["turns"][0]
+        assert np.shape(turn["actual"]) == (25, 2, 3)
+        assert np.shape(turn["planned"])[1:] == (2, 3)
+        assert abs(turn["contact_angle_deg"]) <= 60
+        assert turn["looked_at"] >= 72
+        # Toward the goal, and not far from where the plan said.
+        gap = np.subtract(turn["actual"][-1], turn["planned"][9])[:, :2]
+        assert np.abs(gap).max() < 8
+    assert records[0]["goal_mm"] != records[1]["goal_mm"]
+
+
+def test_what_is_there_is_not_run_again_and_what_is_missing_comes_out_the_same(done):
+    out, records = done
+    kept = episode_file(out, 0).stat().st_mtime_ns
+    episode_file(out, 1).unlink()
+    (out / trials.SUMMARY).unlink()
+    told = []
+    again = run_trials(CONFIG, out, on_episode=told.append)
+    assert episode_file(out, 0).stat().st_mtime_ns == kept
+    assert list(map(without_times, again)) == list(map(without_times, records))
+    assert told == again
+    with pytest.raises(RunConflict, match="pushes is 2 there and 3 here"):
+        run_trials(replace(CONFIG, pushes=3), out)
+
+
+def test_an_interrupted_episode_is_kept_beside(tmp_path, monkeypatch):
+    def stop(*args, **settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(trials, "run_episode", stop)
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(CONFIG, tmp_path / "out")
+    left = json.loads((tmp_path / "out/episodes/000.interrupted.json").read_text())
+    assert left["reason"] == "interrupted"
+    assert not episode_file(tmp_path / "out", 0).exists()
+
+
+def test_models_see_the_same_worlds_and_their_own_properties():
+    one, same = (make_trial(replace(CONFIG, model=m), 3) for m in ("physics", "in"))
+    np.testing.assert_array_equal(one.task.goal, same.task.goal)
+    assert one.robot.scene.table_friction == same.robot.scene.table_friction
+    nominal = make_trial(replace(CONFIG, knows="nominal"), 3)
+    np.testing.assert_allclose(nominal.scene.radius, [0.0525, 0.058])
+    np.testing.assert_allclose(one.scene.radius, [0.054, 0.059])
+    np.testing.assert_array_equal(one.robot.scene.radius, nominal.robot.scene.radius)
+    chain = make_trial(replace(CONFIG, disks=3), 3)
+    gaps = np.diff(np.asarray(chain.robot.truth.position)[:, 0])
+    radius = np.asarray(chain.scene.radius)
+    np.testing.assert_allclose(gaps, radius[:-1] + radius[1:], rtol=1e-6)
+    assert chain.task.moved == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "says"),
+    [
+        ({"model": "nothing"}, UnknownName, "nothing"),
+        ({"planner": "cem"}, UnknownName, "greedy"),
+        ({"world": "havok"}, UnknownName, "planar"),
+        ({"deadline": 1.0}, BadInput, "--deadline"),
+    ],
+)
+def test_what_cannot_be_is_said_before_anything_is_made(tmp_path, changes, error, says):
+    with pytest.raises(error, match=says):
+        run_trials(replace(CONFIG, **changes), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_network_for_other_controls_is_refused(tmp_path):
+    folder = write_network(tmp_path / "net", kind="direct-force")
+    with pytest.raises(BadCheckpoint, match="kind is 'direct-force'"):
+        run_trials(replace(CONFIG, model=str(folder)), tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("trials", 0), ("pushes", 0), ("disks", 1), ("seed", -1)),
+        *(("tolerance", 0.0), ("tolerance", 1.5), ("alignment", -1.0)),
+        ("deadline", 0.0),
+    ],
+)
+def test_bad_settings_name_their_option(name, value):
+    with pytest.raises(BadInput, match=f"^--{name} is {value}"):
+        ControlConfig(**{name: value})
+
+
+def records_of(solved, pushes=20, final=3.0):
+    return [
+        {"solved": s, "pushes": pushes, "final_mm": final, "decision_s": [0.1, 0.3]}
+        for s in solved
+    ]
+
+
+def test_success_has_wilsons_interval():
+    found = summarise(records_of([True] * 22 + [False] * 3))
+    assert (found["solved"], found["success"]) == (22, 0.88)
+    # Wilson (1927) by hand: z = 1.96.
+    z, n, p = 1.959964, 25, 0.88
+    middle = (p + z**2 / (2 * n)) / (1 + z**2 / n)
+    half = z / (1 + z**2 / n) * np.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))
+    assert found["interval"] == pytest.approx([middle - half, middle + half], abs=1e-6)
+    assert found["median_pushes"] == 20
+    assert found["median_decision_s"] == pytest.approx(0.2)
+    assert found["within_4_mm"] == 1.0
+    assert found["within_25_pushes"] == 0.88
+    assert summarise(records_of([False]))["median_pushes"] is None
+
+
+def test_pairs_are_compared_exactly():
+    one, other = records_of([True] * 9 + [False]), records_of([True] * 3 + [False] * 7)
+    found = paired_test(one, other)
+    assert (found["only_one"], found["only_other"]) == (6, 0)
+    assert found["p"] == pytest.approx(2 * 0.5**6)
+    assert paired_test(one, one)["p"] == 1.0

@@ -1,0 +1,193 @@
+"""Planners against a naive search, and against input that cannot be planned from."""
+
+import itertools
+from functools import lru_cache
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from planning.scenes import FEW, goal_ahead, scene, single, touching
+from sainet.engines import make_engine
+from sainet.errors import BadInput, BadScene, UnknownName
+from sainet.models.dynamics import PhysicsDynamics
+from sainet.planning import PLANNERS, make_planner
+from sainet.planning.greedy import GreedyPlanner
+from sainet.planning.outcomes import every_push, roll_pushes
+from sainet.planning.tree import TreePlanner
+from sainet.pushes import PushGrid
+from sainet.scene import at_rest
+
+SCENE, STATE = scene(), touching()
+PHYSICS = PhysicsDynamics(make_engine("planar"))
+FAR, NEAR = goal_ahead(0.17, 0.6), goal_ahead(0.009, 0.3, tolerance=0.02)
+every_planner = pytest.mark.parametrize("name", PLANNERS)
+
+
+@eqx.filter_jit
+def end_of(push, state):
+    batch = jax.tree.map(lambda x: x[None], (SCENE, state, push))
+    end = roll_pushes(PHYSICS, *batch).final
+    return jax.tree.map(
+        lambda x: x[0], at_rest(end.position, end.angle, end.pusher_position)
+    )
+
+
+@lru_cache
+def naive_ends(length):
+    """Every sequence of so many of the few pushes and where it ends, one by one."""
+    grid, ends = FEW.pushes(), {(): STATE}
+    for sequence in itertools.product(range(6), repeat=length):
+        for stop in range(1, length + 1):
+            if sequence[:stop] not in ends:
+                push = jax.tree.map(lambda x, i=sequence[stop - 1]: x[i], grid)
+                ends[sequence[:stop]] = end_of(push, ends[sequence[: stop - 1]])
+    return ends
+
+
+def best_of(task, length):
+    """The rule in words: the fewest pushes that solve it, else the least cost."""
+    ends = {s: e for s, e in naive_ends(length).items() if s}
+    for count in range(1, length + 1):
+        solved = [
+            (float(task.distance(end)), sequence)
+            for sequence, end in ends.items()
+            if len(sequence) == count and task.is_solved(SCENE, end)
+        ]
+        if solved:
+            return min(solved)[1]
+    return min((float(task.cost(end)), sequence) for sequence, end in ends.items())[1]
+
+
+def indices(plan):
+    grid = FEW.pushes()
+    return tuple(
+        int(
+            np.argmin(
+                np.abs(grid.contact_angle - p.contact_angle)
+                + np.abs(grid.direction - p.direction)
+            )
+        )
+        for p in plan.pushes
+    )
+
+
+@pytest.mark.parametrize("angle", [0.25, 0.6, -0.9])
+def test_the_tree_finds_what_a_naive_search_finds(angle):
+    task = goal_ahead(0.17, angle)
+    plan = TreePlanner(actions=FEW).plan(PHYSICS, task, SCENE, STATE)
+    assert indices(plan) == best_of(task, 2)
+    assert plan.looked_at == 6 + 36
+    assert plan.is_complete
+    # The path is that of the pushes, to where the search says they end.
+    end = single(plan.path[-1, :, :2])
+    assert plan.path.shape == (160, 2, 3)
+    assert float(jnp.linalg.norm(end[1] - task.goal)) == pytest.approx(
+        plan.distance, abs=2e-5
+    )
+
+
+def test_near_the_goal_the_best_sequences_get_a_third_push():
+    planner = TreePlanner(actions=FEW, beam=36)
+    plan = planner.plan(PHYSICS, NEAR, SCENE, STATE)
+    assert plan.looked_at == 6 + 36 + 216
+    narrow = TreePlanner(actions=FEW, beam=4)
+    assert narrow.plan(PHYSICS, NEAR, SCENE, STATE).looked_at == 6 + 36 + 24
+
+
+@every_planner
+def test_one_push_that_is_enough_is_the_plan(name):
+    push = jax.tree.map(lambda x: x[20], PushGrid().pushes())
+    goal = end_of(push, STATE).position[1]
+    task = eqx.tree_at(lambda t: t.goal, goal_ahead(0.1), goal)
+    plan = make_planner(name).plan(PHYSICS, task, SCENE, STATE)
+    assert len(plan.pushes) == 1
+    assert plan.distance <= 0.1 * 0.059
+    assert plan.looked_at >= 72
+
+
+@every_planner
+def test_the_grid_is_that_of_the_paper(name):
+    pushes = make_planner(name).actions.pushes()
+    assert pushes.length.shape == (72,)
+    assert float(jnp.abs(pushes.contact_angle).max()) <= np.pi / 3
+    assert float(jnp.abs(pushes.direction).max()) <= np.pi / 6
+
+
+@every_planner
+def test_the_same_decision_twice_is_the_same_plan(name):
+    one, two = (make_planner(name).plan(PHYSICS, FAR, SCENE, STATE) for _ in range(2))
+    np.testing.assert_array_equal(one.path, two.path)
+    assert one.cost == two.cost
+
+
+def test_the_greedy_search_follows_the_heuristic():
+    found = GreedyPlanner(actions=FEW).search(PHYSICS, FAR, SCENE, STATE)
+    ends = {s: float(FAR.cost(end)) for s, end in naive_ends(1).items() if s}
+    first = min(ends, key=ends.__getitem__)
+    assert found.actions[:1] == first
+    assert len(found.actions) == 2
+    assert found.looked_at == 12
+
+
+def test_a_queue_that_gives_nothing_ends_with_the_best_so_far():
+    planner = GreedyPlanner(actions=FEW, same=10.0)  # every state is the first one
+    found = planner.search(PHYSICS, FAR, SCENE, STATE)
+    assert len(found.actions) == 1
+    assert not found.is_complete
+
+
+def test_a_deadline_ends_with_the_best_so_far():
+    hasty = TreePlanner(actions=FEW, deadline=1e-9, block=2)
+    plan = hasty.plan(PHYSICS, FAR, SCENE, STATE)
+    assert not plan.is_complete
+    assert (len(plan.pushes), plan.looked_at) == (1, 6)
+    patient = TreePlanner(actions=FEW, deadline=100.0, block=2)
+    plan = patient.plan(PHYSICS, FAR, SCENE, STATE)
+    assert indices(plan) == best_of(FAR, 2)
+    assert plan.is_complete
+
+
+def test_outcomes_are_those_of_single_predictions():
+    states = jax.tree.map(lambda *x: np.stack(x), STATE, moved())
+    found = every_push(PHYSICS, FAR, SCENE, states, jax.device_get(FEW.pushes()))
+    assert found.cost.shape == (2, 6)
+    push = jax.tree.map(lambda x: x[4], FEW.pushes())
+    wanted = end_of(push, moved())
+    np.testing.assert_allclose(found.state.position[1, 4], wanted.position, atol=1e-6)
+    assert found.distance[1, 4] == pytest.approx(float(FAR.distance(wanted)), abs=1e-6)
+    assert not found.state.velocity.any()
+
+
+def moved():
+    return eqx.tree_at(lambda s: s.position, STATE, STATE.position + 0.03)
+
+
+@every_planner
+@pytest.mark.parametrize("field", ["position", "angle"])
+def test_an_observation_with_nan_is_refused(name, field):
+    bad = eqx.tree_at(
+        lambda s: getattr(s, field), STATE, getattr(STATE, field).at[0].set(jnp.nan)
+    )
+    with pytest.raises(BadScene, match=f"observation: {field}"):
+        make_planner(name).plan(PHYSICS, FAR, SCENE, bad)
+
+
+@every_planner
+def test_disks_in_one_another_are_refused_and_disks_apart_are_told_of(name):
+    planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
+    with pytest.raises(BadScene, match="overlap by 8.0 mm"):
+        planner.plan(PHYSICS, FAR, SCENE, touching(-0.008))
+    assert planner.plan(PHYSICS, FAR, SCENE, touching(-0.0005)).warnings == ()
+    (warning,) = planner.plan(PHYSICS, FAR, SCENE, touching(0.02)).warnings
+    assert "disks that touch" in warning
+
+
+def test_planners_by_name():
+    assert make_planner("tree", deadline=0.5).deadline == 0.5
+    with pytest.raises(UnknownName, match="greedy"):
+        make_planner("cem")
+    with pytest.raises(BadInput, match="--deadline"):
+        make_planner("greedy", deadline=1.0)

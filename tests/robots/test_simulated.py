@@ -1,0 +1,61 @@
+"""The robot of the simulated world: as exact as its noise lets it be."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from planning.scenes import scene, touching
+from sainet.engines import make_engine
+from sainet.engines.config import NoiseConfig, at_level
+from sainet.models.dynamics import PhysicsDynamics
+from sainet.planning.outcomes import roll_pushes
+from sainet.pushes import PushGrid
+from sainet.robots.simulated import SimulatedRobot
+
+QUIET = at_level(NoiseConfig(), "none")
+PUSH = jax.tree.map(lambda x: x[33], PushGrid().pushes())
+
+
+def robot(noise=QUIET, seed=0):
+    engine, rng = make_engine("planar"), np.random.default_rng(seed)
+    return SimulatedRobot(engine, scene(), touching(), noise=noise, rng=rng)
+
+
+def test_without_noise_a_push_ends_where_the_engine_says():
+    made = robot()
+    seen = made.observe()
+    found = made.push(PUSH)
+    batch = jax.tree.map(lambda x: x[None], (scene(), seen, PUSH))
+    wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch).states
+    position = np.asarray(wanted.position[0])
+    np.testing.assert_allclose(found.path[:80, :, :2], position, atol=1e-5)
+    np.testing.assert_allclose(made.truth.position, found.path[-1, :, :2])
+    assert found.trouble is None
+    assert not np.asarray(made.observe().velocity).any()
+
+
+def test_what_is_seen_is_noisy_and_the_truth_is_not():
+    made = robot(NoiseConfig())
+    seen = np.array([made.observe().position for _ in range(300)])
+    np.testing.assert_array_equal(made.truth.position, touching().position)
+    assert seen.std(axis=0) == pytest.approx(1.5e-4, rel=0.2)
+    assert np.abs(seen.mean(axis=0) - made.truth.position).max() < 4e-5
+
+
+def test_the_same_seed_is_the_same_world():
+    def end(seed):
+        made = robot(NoiseConfig(), seed)
+        made.observe()
+        return made.push(PUSH).path[-1]
+
+    np.testing.assert_array_equal(end(3), end(3))
+    assert np.abs(end(3) - end(4)).max() > 1e-5
+
+
+def test_a_push_that_moves_nothing_is_told():
+    made = robot()
+    made.observe()
+    short = eqx.tree_at(lambda p: p.length, PUSH, jnp.float32(1e-6))
+    assert made.push(short).trouble == "disk 1 did not move"
