@@ -157,7 +157,7 @@ def manifest(devices: int = 0) -> dict[str, Any]:
         "git_commit": _git_commit(),
         "python": platform.python_version(),
         "machine": platform.machine(),
-        "processor": _processor(),
+        "processor": processor(),
         "cores": os.cpu_count(),
         "devices": devices,
     }
@@ -185,7 +185,8 @@ def _git_commit() -> str | None:
     return done.stdout.decode().strip() or None
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the name of this machine's processor."""
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
             if line.startswith("model name"):

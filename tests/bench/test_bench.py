@@ -117,6 +117,19 @@ def test_engines_reports_what_the_docs_say():
 
 
 @pytest.mark.slow
+def test_planning_reports_what_the_docs_say():
+    figures = load_case("planning")(2, model="physics")
+    wanted = ("full_tree_s", "greedy_s", "looked_at", "bullet_push_s", "bullet_ratio")
+    wanted += ("cold_start_s", "warm_start_s", "decisions", "devices")
+    assert tuple(figures) == wanted
+    bullet = ("bullet_push_s", "bullet_ratio")
+    assert all_finite(figures, but=() if find_spec("pybullet") else bullet)
+    assert figures["looked_at"] == 72 + 72**2
+    assert figures["warm_start_s"] < figures["cold_start_s"]
+    json.dumps(figures, allow_nan=False)
+
+
+@pytest.mark.slow
 def test_training_reports_what_the_docs_say():
     figures = load_case("training")(2, pushes=3, steps=4, repeats=1)
     assert set(figures) == {
@@ -164,7 +177,7 @@ def test_the_ceiling_is_a_rate_that_a_machine_can_have():
 
 
 def test_an_unknown_case_names_those_there_are():
-    with pytest.raises(UnknownName, match="'trainin'.*engines, training"):
+    with pytest.raises(UnknownName, match="'trainin'.*engines, planning, training"):
         load_case("trainin")
 
 

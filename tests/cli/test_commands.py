@@ -1,8 +1,10 @@
 """The commands as a user types them: exit statuses, error lines, JSON at the end."""
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -10,9 +12,13 @@ SAINET = [sys.executable, "-m", "sainet"]
 SMALL = ["--pushes", "24", "--chunk-size", "12", "--workers", "1", "--quiet"]
 
 
-def sainet(*words, status=0):
+def sainet(*words, status=0, **environment):
     done = subprocess.run(
-        [*SAINET, *map(str, words)], capture_output=True, text=True, check=False
+        [*SAINET, *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | environment,
     )
     assert done.returncode == status, done.stderr
     return done
@@ -120,6 +126,27 @@ def test_shipped_networks_are_compared_where_they_fit(pushes):
     error = sainet(*words, status=2).stderr
     assert "inner_engine is 'planar', not 'bullet'" in error
     assert len(error.splitlines()) == 1
+
+
+@pytest.mark.slow
+def test_control(tmp_path):
+    out, cache = tmp_path / "out", tmp_path / "cache"
+    words = ("control", "--model", "physics", "--trials", 2, "--pushes", 1)
+    words += ("--goals", "hard", "--out", out, "--json", "--quiet")
+    done = sainet(*words, XDG_CACHE_HOME=str(cache))
+    result = json.loads(done.stdout.splitlines()[-1])
+    named = {name: result[name] for name in ("model", "goals", "planner", "world")}
+    assert list(named.values()) == ["physics", "hard", "greedy", "planar"]
+    assert (result["trials"], result["solved"], result["success"]) == (2, 0, 0.0)
+    low, high = result["interval"]
+    assert low == 0.0 < high < 1
+    names = {"median_pushes", "median_decision_s", "within_4_mm", "episodes"}
+    assert names <= result.keys()
+    assert len(list(Path(result["episodes"]).glob("*.json"))) == 2
+    assert list(cache.rglob("*-cache"))  # what was compiled is kept
+    error = sainet("control", "--model", "no", "--out", tmp_path / "x", status=2).stderr
+    assert error.startswith("sainet: No model named 'no'")
+    assert not (tmp_path / "x").exists()
 
 
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):

@@ -12,6 +12,7 @@ from sainet.names import load_named
 # Functions that take `runs`.
 CASES = {
     "engines": "sainet.bench.engines:bench_engines",
+    "planning": "sainet.bench.planning:bench_planning",
     "training": "sainet.bench.training:bench_training",
 }
 

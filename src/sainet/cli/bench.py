@@ -14,7 +14,7 @@ class Bench:
     """Measure how fast this machine is at the heavy parts."""
 
     cases: Positional[tuple[str, ...]] = ()
-    """training, engines; default: all."""
+    """training, engines, planning; default: all."""
     devices: int | None = None
     """CPU devices to split a batch over; default: one a core."""
     output: Output = field(default_factory=Output)

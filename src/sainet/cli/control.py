@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from sainet.cli.devices import use_cache
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.control.config import ControlConfig
@@ -24,6 +25,7 @@ class Control:
 
     def run(self) -> dict[str, Any]:
         """Run the trials and say how they went."""
+        use_cache()
         from sainet.control.summary import summarise
         from sainet.control.trials import run_trials
 

@@ -1,7 +1,14 @@
 """Set JAX up before the first array is made."""
 
+import os
+import platform
+from pathlib import Path
+
 from sainet.errors import BadInput
 from sainet.processes import core_count
+from sainet.runs import content_hash, processor
+
+_WORTH_KEEPING = "0.5"  # s of compilation
 
 
 def use_devices(count: int | None = None) -> None:
@@ -10,8 +17,30 @@ def use_devices(count: int | None = None) -> None:
     Raises:
         BadInput: a count below one.
     """
-    import jax
-
     if count is not None and count < 1:
         raise BadInput(f"--devices is {count}; it must be at least 1.")
+    use_cache()
+    import jax
+
     jax.config.update("jax_num_cpu_devices", count or core_count())
+
+
+def use_cache() -> None:
+    """Keep what JAX compiles, for this process and those it starts.
+
+    A folder for each processor: code that was compiled for one may not run on another
+    that shares the home folder. JAX's own variables take precedence.
+    """
+    settings = {
+        "JAX_COMPILATION_CACHE_DIR": str(cache_folder()),
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": _WORTH_KEEPING,
+    }
+    for name, value in settings.items():
+        os.environ.setdefault(name, value)
+
+
+def cache_folder() -> Path:
+    """Return where compiled code is kept: ``$XDG_CACHE_HOME/sainet`` or ~/.cache."""
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    machine = f"{processor()} {platform.machine()}"
+    return Path(home) / "sainet" / content_hash(machine.encode())[:12]

@@ -1,0 +1,127 @@
+"""How long a decision takes, and what the same look ahead would cost in Bullet."""
+
+import os
+import subprocess
+import sys
+from importlib.util import find_spec
+from statistics import median
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from sainet.bench.timing import check_runs
+from sainet.control.config import ControlConfig
+from sainet.control.trials import Trial, make_trial
+from sainet.engines import make_engine
+from sainet.models.dynamics import PhysicsDynamics
+from sainet.models.registry import load_dynamics
+from sainet.planning import PLANNERS, make_planner
+from sainet.planning.base import Plan
+from sainet.planning.outcomes import batch_of, roll_pushes
+from sainet.pushes import PushGrid
+
+DECISIONS = 50
+_ROUNDS = 5  # in each of which decisions and pushes in Bullet take turns
+_PUSHES = 20  # in Bullet, in a round
+_FIRST_DECISION = """
+import jax
+jax.config.update("jax_num_cpu_devices", {devices})
+from sainet.bench.planning import decide
+decide({model!r})
+"""
+
+
+def bench_planning(
+    runs: int = DECISIONS, *, model: str = "sain", starts: bool = True
+) -> dict[str, Any]:
+    """Measure decisions of both planners, Bullet beside them, and the first one.
+
+    Args:
+        runs: decisions of each planner to take the median of.
+        model: what they predict with.
+        starts: whether new processes are started to time their first decision.
+
+    Returns:
+        `full_tree_s`, `greedy_s`, `bullet_ratio`, `cold_start_s`, `warm_start_s`, and
+        what they rest on.
+    """
+    check_runs(runs)
+    # The first decision compiles.
+    looked_at = {name: decide(model, name).looked_at for name in PLANNERS}
+    times: dict[str, list[float]] = {"tree": [], "greedy": [], "bullet": []}
+    for _ in range(_ROUNDS):
+        for name in PLANNERS:
+            each = range(-(-runs // _ROUNDS))
+            times[name] += [_timed(model, name) for _ in each]
+        times["bullet"] += _bullet_pushes()
+    tree, push = median(times["tree"]), median(times["bullet"] or [0.0])
+    cold, warm = _starts(model) if starts else (None, None)
+    return {
+        "full_tree_s": tree,
+        "greedy_s": median(times["greedy"]),
+        "looked_at": looked_at["tree"],
+        "bullet_push_s": push or None,
+        "bullet_ratio": looked_at["tree"] * push / tree or None,
+        "cold_start_s": cold,
+        "warm_start_s": warm,
+        "decisions": len(times["tree"]),
+        "devices": jax.device_count(),
+    }
+
+
+def decide(model: str, planner: str = "tree") -> Plan:
+    """Make one decision at the start of a hard trial."""
+    trial = _trial()
+    dynamics = load_dynamics(model).dynamics
+    state = trial.robot.observe()
+    return make_planner(planner).plan(dynamics, trial.task, trial.scene, state)
+
+
+def _trial() -> Trial:
+    return make_trial(ControlConfig(goals="hard"), 0)
+
+
+def _timed(model: str, planner: str) -> float:
+    trial, dynamics = _trial(), load_dynamics(model).dynamics
+    state, chosen = trial.robot.observe(), make_planner(planner)
+    start = perf_counter()
+    chosen.plan(dynamics, trial.task, trial.scene, state)
+    return perf_counter() - start
+
+
+def _bullet_pushes() -> list[float]:
+    """Return how long pushes take in one Bullet world (s); none without PyBullet."""
+    if not find_spec("pybullet"):
+        return []
+    trial, physics = _trial(), PhysicsDynamics(make_engine("bullet"))
+    scene, state = (
+        batch_of(trial.scene, 1),
+        jax.tree.map(lambda x: jnp.asarray(x)[None], trial.robot.truth),
+    )
+    times = []
+    for index in range(_PUSHES):
+        push = jax.tree.map(lambda x, i=index: x[i][None], PushGrid().pushes())
+        start = perf_counter()
+        jax.block_until_ready(roll_pushes(physics, scene, state, push).states)
+        times.append(perf_counter() - start)
+    return times
+
+
+def _starts(model: str) -> tuple[float, float]:
+    """Return how long a process takes to decide, without compiled code and with it."""
+    code = _FIRST_DECISION.format(model=model, devices=jax.device_count())
+    with TemporaryDirectory(prefix="sainet-bench-") as folder:
+        settings = {
+            "JAX_COMPILATION_CACHE_DIR": folder,
+            "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.5",
+        }
+        times = []
+        for _ in range(2):
+            start = perf_counter()
+            command = [sys.executable, "-c", code]
+            subprocess.run(command, check=True, env=os.environ | settings)
+            times.append(perf_counter() - start)
+    return times[0], times[1]
