@@ -27,9 +27,10 @@ class Control:
         """Run the trials and say how they went."""
         use_cache()
         from sainet.control.summary import summarise
-        from sainet.control.trials import run_trials
+        from sainet.control.trials import prepare, run_trials
 
         config = self.config
+        prepare(config)
         solved = 0
         bar = progress_bar(f"Pushing ({config.model})", config.trials, self.output)
         with worker_pool(self.workers) as pool, bar as advance:

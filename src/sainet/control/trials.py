@@ -66,7 +66,7 @@ def run_trials(
         RunConflict: the folder holds something else.
         BadInput: the model cannot be used for such pushes.
     """
-    _models(config)  # what is wrong with it is said before anything is made
+    prepare(config)  # what is wrong with it is said before anything is made
     settings = {"command": "control", **asdict(config)}
     open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     files = [episode_file(out, trial) for trial in range(config.trials)]
@@ -91,7 +91,7 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
 
     An interrupted episode leaves its record beside, under another name.
     """
-    model, planner = _models(config)
+    model, planner = prepare(config)
     trial, episode = make_trial(config, index), Episode()
     path = episode_file(out, index)
     try:
@@ -130,8 +130,12 @@ def _each_done(
 
 
 @lru_cache(maxsize=1)
-def _models(config: ControlConfig) -> tuple[NamedDynamics, AbstractPlanner]:
-    """Load what plans, once for a process: nothing compiles twice."""
+def prepare(config: ControlConfig) -> tuple[NamedDynamics, AbstractPlanner]:
+    """Load what plans, once for a process: nothing compiles twice.
+
+    Raises:
+        BadInput: model, planner or world cannot be had, or not for such pushes.
+    """
     model = load_dynamics(config.model)
     model.check_fits("robot", TIME_STEP)
     planner = make_planner(config.planner, deadline=config.deadline)
