@@ -10,7 +10,7 @@ import argparse
 import shutil
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
@@ -19,6 +19,7 @@ from sainet.processes import worker_pool
 
 if TYPE_CHECKING:
     from sainet.experiments.paper_setup import PaperSetup
+    from sainet.models.card import Card
 
 SEED = 0
 
@@ -46,16 +47,23 @@ def main() -> None:
 
 def build(setup: "PaperSetup", into: Path) -> None:
     """Copy card and weights of each shipped network into a folder of its name."""
-    from sainet.models.card import CARD, WEIGHTS
+    from sainet.models.card import CARD, WEIGHTS, read_card
     from sainet.models.registry import SHIPPED
+    from sainet.runs import write_json
 
     for name in SHIPPED:
         (folder,) = setup.train(name, (SEED,))
         target = into / name
         target.mkdir(parents=True, exist_ok=True)
-        for file in (CARD, WEIGHTS):
-            shutil.copyfile(setup.chain.out / folder / file, target / file)
+        shutil.copyfile(setup.chain.out / folder / WEIGHTS, target / WEIGHTS)
+        write_json(target / CARD, whole_card(read_card(setup.chain.out / folder)))
         setup.chain.say(f"{name} is in {target}")
+
+
+def whole_card(card: "Card") -> dict[str, Any]:
+    """Return a card with the settings that came after its training: their defaults."""
+    config = {"recurrent": card.recurrent, **card.config}
+    return card.to_dict() | {"config": config}
 
 
 if __name__ == "__main__":
