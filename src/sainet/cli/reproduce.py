@@ -21,8 +21,8 @@ class Reproduce:
     experiments: Positional[tuple[str, ...]] = ()
     """direct-force-two-disks (the paper's Table I), direct-force-three-disks (II) and
     robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
-    regularisation and robustness with the networks of Table III; robot-planar;
-    engine-parity. Default: all."""
+    regularisation and robustness with the networks of Table III; simulated-control
+    with the shipped ones; robot-planar; engine-parity. Default: all."""
     scale: Scale = "quick"
     """quick: minutes. paper: 4,500 pushes and 10,000 iterations."""
     out: Path = Path("runs/reproduce")
@@ -36,6 +36,7 @@ class Reproduce:
         use_devices(self.devices)
         from sainet.experiments import EXPERIMENTS, load_experiment
         from sainet.experiments.chain import Chain
+        from sainet.viz.control_table import is_control, print_control
         from sainet.viz.tables import print_table
 
         tables: dict[str, Any] = {}
@@ -45,6 +46,7 @@ class Reproduce:
                 folder = self.out / f"{name}-{self.scale}"
                 chain = Chain(folder, pool, self.output.say, bar)
                 tables[name] = load_experiment(name)(self.scale, chain)
-                print_table(tables[name], self.output.console)
+                show = print_control if is_control(tables[name]) else print_table
+                show(tables[name], self.output.console)
         only = next(iter(tables.values()))
         return only if len(tables) == 1 else {"experiments": tables}

@@ -14,6 +14,7 @@ EXPERIMENTS = {
     "recurrent-or-not": "sainet.experiments.recurrent_or_not:run",
     "regularisation": "sainet.experiments.regularisation:run",
     "robustness": "sainet.experiments.robustness:run",
+    "simulated-control": "sainet.experiments.simulated_control:run",
     "engine-parity": "sainet.experiments.engine_parity:run",
     "robot-planar": "sainet.experiments.robot_planar:run",
 }

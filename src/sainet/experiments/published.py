@@ -32,6 +32,14 @@ ROBOT_TWO_DISKS = {
     "sain": {"trans": (1.82, 1.50), "pos": (4.66, 3.47), "rot": (0.40, 0.21)},
 }
 
+# Shares of 25 trials each, Bullet's world, the paper's search.
+SIMULATED_CONTROL = (
+    {"group": "easy, greedy", "model": "in", "trials": 25, "success": 1.00},
+    {"group": "hard, greedy", "model": "in", "trials": 25, "success": 0.88},
+    {"group": "easy, greedy", "model": "sain", "trials": 25, "success": 1.00},
+    {"group": "hard, greedy", "model": "sain", "trials": 25, "success": 1.00},
+)
+
 
 def published_rows(
     table: Mapping[str, Mapping[str, Sequence[float]]],
