@@ -144,6 +144,7 @@ def test_control(tmp_path):
     assert names <= result.keys()
     assert len(list(Path(result["episodes"]).glob("*.json"))) == 2
     assert list(cache.rglob("*-cache"))  # what was compiled is kept
+    assert (out / "episodes.svg").stat().st_size > 0
     error = sainet("control", "--model", "no", "--out", tmp_path / "x", status=2).stderr
     assert error.startswith("sainet: No model named 'no'")
     assert not (tmp_path / "x").exists()

@@ -10,6 +10,8 @@ from sainet.cli.progress import progress_bar
 from sainet.control.config import ControlConfig
 from sainet.processes import worker_pool
 
+_DRAWN = 6  # episodes
+
 
 @dataclass(frozen=True, kw_only=True)
 class Control:
@@ -28,6 +30,7 @@ class Control:
         use_cache()
         from sainet.control.summary import summarise
         from sainet.control.trials import prepare, run_trials
+        from sainet.viz.episodes import draw_episodes
 
         config = self.config
         prepare(config)
@@ -41,12 +44,14 @@ class Control:
                 advance(1, f"{solved} solved")
 
             records = run_trials(config, self.out, executor=pool, on_episode=on_episode)
+        figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
         found = summarise(records)
         low, high = found["interval"]
         self.output.say(
             f"{config.model}: {found['solved']} of {found['trials']} {config.goals} "
             f"goals solved (95 % interval {low:.0%} to {high:.0%}), median "
-            f"{found['median_pushes']} pushes; episodes are in {self.out}"
+            f"{found['median_pushes']} pushes; episodes are in {self.out}, the first "
+            f"{_DRAWN} drawn in {figure}"
         )
         names = {
             name: getattr(config, name)

@@ -1,0 +1,84 @@
+"""Episodes of control in the manner of the paper's figure: start, goal and end."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+from sainet.viz.canvas import house_look, new_figure, save
+from sainet.viz.palette import INK
+
+PUSHED, MOVED, OTHER = "#c8553d", "#2a6fb5", "#8b8f94"  # red, blue as in the paper
+TARGET = "#f0c808"
+_ACROSS = 3  # panels
+
+Record = Mapping[str, Any]
+
+
+def draw_episodes(records: Sequence[Record], path: Path) -> Path:
+    """Draw each episode in a panel: disks at the start transparent, at the end solid.
+
+    The target region is the disk of the tolerance about the goal; the centre of the
+    moved disk at the end is a white cross.
+
+    Args:
+        records: as they are kept in the run folder of `sainet control`.
+        path: where to write; ``.svg`` or ``.png``.
+    """
+    across = min(_ACROSS, len(records))
+    down = math.ceil(len(records) / across)
+    with house_look():
+        figure = new_figure(0.4 + 2.9 * across, 0.3 + 2.6 * down)
+        panels = figure.subplots(down, across, squeeze=False).ravel()
+        for axes, record in zip(panels, records, strict=False):
+            draw_episode(axes, record)
+        for axes in panels[len(records) :]:
+            axes.set_axis_off()
+        return save(figure, path)
+
+
+def draw_episode(axes: Axes, record: Record) -> None:
+    """Draw one episode (mm)."""
+    path = body_paths(record)
+    for body, radius in enumerate(record["radius_mm"]):
+        color = body_color(record, body)
+        centres = path[:, body, :2]
+        _disk(axes, centres[0], radius, facecolor=(color, 0.15), edgecolor=(color, 0.5))
+        _disk(axes, centres[-1], radius, facecolor=(color, 0.85), edgecolor=color)
+        axes.plot(*centres.T, color=color, linewidth=1.0)
+    _disk(axes, record["goal_mm"], record["tolerance_mm"], facecolor=TARGET, zorder=4)
+    end = path[-1, record["moved"], :2]
+    axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
+    said = "solved" if record["solved"] else record["reason"]
+    axes.set_title(
+        f"{record['pushes']} pushes, {said}, {record['final_mm']:.1f} mm off"
+    )
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+
+
+def body_paths(record: Record) -> np.ndarray:
+    """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg)."""
+    turns = record["turns"]
+    if not turns:
+        return np.zeros((1, len(record["radius_mm"]), 3))
+    return np.concatenate(
+        [np.asarray([turns[0]["observed"]]), *(np.asarray(t["actual"]) for t in turns)]
+    )
+
+
+def body_color(record: Record, body: int) -> str:
+    """Return the colour of a disk: the pushed one red, the moved one blue."""
+    if body == record["moved"]:
+        return MOVED
+    return PUSHED if body == 0 else OTHER
+
+
+def _disk(axes: Axes, centre: Sequence[float], radius: float, **look: Any) -> None:  # noqa: ANN401
+    look.setdefault("edgecolor", INK)
+    axes.add_patch(Circle((centre[0], centre[1]), radius, linewidth=0.8, **look))
