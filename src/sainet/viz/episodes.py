@@ -17,6 +17,7 @@ TARGET = "#f0c808"
 _ACROSS = 3  # panels
 
 Record = Mapping[str, Any]
+Place = Sequence[float] | np.ndarray  # mm
 
 
 def draw_episodes(records: Sequence[Record], path: Path) -> Path:
@@ -79,6 +80,6 @@ def body_color(record: Record, body: int) -> str:
     return PUSHED if body == 0 else OTHER
 
 
-def _disk(axes: Axes, centre: Sequence[float], radius: float, **look: Any) -> None:  # noqa: ANN401
+def _disk(axes: Axes, centre: Place, radius: float, **look: Any) -> None:  # noqa: ANN401
     look.setdefault("edgecolor", INK)
     axes.add_patch(Circle((centre[0], centre[1]), radius, linewidth=0.8, **look))
