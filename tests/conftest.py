@@ -16,6 +16,16 @@ from jaxtyping import install_import_hook
 
 from support import REPOSITORY, require
 
+# The workers of a run and the commands that they start compile the same things; what
+# one has compiled, no other has to. Set for those commands too, hence the environment.
+CACHE = {
+    "jax_compilation_cache_dir": str(REPOSITORY / ".pytest_cache" / "jax"),
+    "jax_persistent_cache_min_compile_time_secs": "0.3",
+}
+for name, value in CACHE.items():
+    os.environ[name.upper()] = value
+jax.config.update("jax_compilation_cache_dir", CACHE["jax_compilation_cache_dir"])
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
 jax.config.update("jax_num_cpu_devices", 2)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 

@@ -133,7 +133,7 @@ def test_control(tmp_path):
     out, cache = tmp_path / "out", tmp_path / "cache"
     words = ("control", "--model", "physics", "--trials", 2, "--pushes", 1)
     words += ("--goals", "hard", "--out", out, "--json", "--quiet")
-    done = sainet(*words, XDG_CACHE_HOME=str(cache))
+    done = sainet(*words, JAX_COMPILATION_CACHE_DIR=str(cache))
     result = json.loads(done.stdout.splitlines()[-1])
     named = {name: result[name] for name in ("model", "goals", "planner", "world")}
     assert list(named.values()) == ["physics", "hard", "greedy", "planar"]
