@@ -3,9 +3,10 @@
 import multiprocessing
 import os
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
+from typing import Any
 
 from sainet.errors import BadInput
 
@@ -35,6 +36,29 @@ def spawned_pool(workers: int) -> ProcessPoolExecutor:
     """
     context = multiprocessing.get_context("spawn")
     return ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent)
+
+
+def each_done(
+    executor: Executor | None, work: Callable[..., int], jobs: Sequence[tuple[Any, ...]]
+) -> Iterator[int]:
+    """Yield what each job returns, when it is done.
+
+    Args:
+        executor: does the jobs; None does them here, one by one.
+        work: a function of a module; it returns the index of its job.
+        jobs: the arguments of each call.
+    """
+    if executor is None:
+        for job in jobs:
+            yield work(*job)
+        return
+    futures = [executor.submit(work, *job) for job in jobs]
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        for future in futures:
+            future.cancel()
 
 
 def end_with_parent() -> None:

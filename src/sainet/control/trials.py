@@ -1,7 +1,7 @@
 """Many episodes, each with its own goal, table and noise: seeded and resumable."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, as_completed
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import asdict
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +21,7 @@ from sainet.models.named import NamedDynamics
 from sainet.models.registry import load_dynamics
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
+from sainet.processes import each_done
 from sainet.robots.simulated import SimulatedRobot
 from sainet.runs import open_run, read_json, write_json
 from sainet.scene import TIME_STEP, Scene, State, at_rest
@@ -73,8 +74,8 @@ def run_trials(
     known = {index for index, path in enumerate(files) if path.is_file()}
     for index in sorted(known):
         on_episode(read_json(files[index]))
-    missing = [index for index in range(config.trials) if index not in known]
-    for index in _each_done(executor, config, out, missing):
+    missing = [(config, out, i) for i in range(config.trials) if i not in known]
+    for index in each_done(executor, run_trial, missing):
         on_episode(read_json(files[index]))
     records = [read_json(path) for path in files]
     write_json(out / SUMMARY, {"episodes": [str(p.relative_to(out)) for p in files]})
@@ -111,22 +112,6 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
     write_json(path, record(config, index, trial, episode))
     path.with_suffix(".interrupted.json").unlink(missing_ok=True)
     return index
-
-
-def _each_done(
-    executor: Executor | None, config: ControlConfig, out: Path, missing: list[int]
-) -> Iterator[int]:
-    if executor is None:
-        for index in missing:
-            yield run_trial(config, out, index)
-        return
-    futures = [executor.submit(run_trial, config, out, index) for index in missing]
-    try:
-        for future in as_completed(futures):
-            yield future.result()
-    finally:
-        for future in futures:
-            future.cancel()
 
 
 @lru_cache(maxsize=1)

@@ -1,8 +1,8 @@
 """Simulated datasets, chunk by chunk, by as many workers as there are."""
 
 import logging
-from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future, as_completed
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import asdict
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from sainet.datasets.writer import (
     write_chunk,
 )
 from sainet.engines import make_assumed_engine, make_engine
+from sainet.processes import each_done
 from sainet.runs import open_run
 
 _log = logging.getLogger(__name__)
@@ -60,7 +61,8 @@ def generate(
     create_arrays(out, info)
     missing = missing_chunks(out, info)
     on_pushes(config.pushes - sum(_length(info, i) for i in missing))
-    for index in _each_done(executor, config, out, missing):
+    jobs = [(config, out, index) for index in missing]
+    for index in each_done(executor, make_chunk, jobs):
         on_pushes(_length(info, index))
     finish(out, info)
     return open_store(out)
@@ -83,22 +85,3 @@ def make_chunk(config: GenerateConfig, out: Path, index: int) -> int:
 def _length(info: StoreInfo, index: int) -> int:
     part = info.chunk_slice(index)
     return part.stop - part.start
-
-
-def _each_done(
-    executor: Executor | None, config: GenerateConfig, out: Path, missing: list[int]
-) -> Iterator[int]:
-    """Yield the index of each missing chunk when it is written."""
-    if executor is None:
-        for index in missing:
-            yield make_chunk(config, out, index)
-        return
-    futures: list[Future[int]] = [
-        executor.submit(make_chunk, config, out, index) for index in missing
-    ]
-    try:
-        for future in as_completed(futures):
-            yield future.result()
-    finally:
-        for future in futures:
-            future.cancel()
