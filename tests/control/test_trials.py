@@ -1,6 +1,7 @@
 """Trials: seeded, resumable, the same goals for every model."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -56,6 +57,33 @@ def test_what_is_there_is_not_run_again_and_what_is_missing_comes_out_the_same(d
     assert told == again
     with pytest.raises(RunConflict, match="pushes is 2 there and 3 here"):
         run_trials(replace(CONFIG, pushes=3), out)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('{"solved": tr', "cannot be read as JSON"),
+        ("[]", "must hold a JSON object"),
+        ("{}", "trial is missing"),
+        ('{"trial": "0"}', "trial is '0'"),
+    ],
+)
+def test_a_damaged_episode_is_named_with_the_way_out(tmp_path, done, text, says):
+    out = tmp_path / "out"
+    shutil.copytree(done[0], out)
+    episode_file(out, 0).write_text(text)
+    with pytest.raises(BadInput, match=f"000.json: .*{says}.*delete it"):
+        run_trials(CONFIG, out)
+
+
+def test_a_network_trained_again_is_another_model(tmp_path):
+    net, out = tmp_path / "net", tmp_path / "out"
+    config = replace(CONFIG, model=str(write_network(net, seed=0)), trials=1, pushes=1)
+    run_trials(config, out)
+    write_network(net, seed=1)
+    trials.prepare.cache_clear()
+    with pytest.raises(RunConflict, match="weights is"):
+        run_trials(config, out)
 
 
 def test_an_interrupted_episode_is_kept_beside(tmp_path, monkeypatch):

@@ -21,9 +21,9 @@ from sainet.scene import TIME_STEP
 ASSUMED = {"mass": PAPER_MASS, "radius": PAPER_RADIUS, "friction": PAPER_FRICTION}
 
 
-def write_network(folder, model="sain", kind="robot"):
+def write_network(folder, model="sain", kind="robot", seed=0):
     """A trained network's folder, as the training leaves it."""
-    data = save_arrays(folder / WEIGHTS, network(model, kind))
+    data = save_arrays(folder / WEIGHTS, network(model, kind, seed))
     card = Card(
         model=model,
         kind=kind,

@@ -1,16 +1,36 @@
 """An episode as JSON values: what was decided, predicted and seen at every push."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
+from sainet.errors import BadInput
+from sainet.runs import read_json
 
 if TYPE_CHECKING:
     from sainet.control.trials import Trial
 
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
+_NUMBER = (int, float)
+_FIELDS: dict[str, type | tuple[type, ...]] = {
+    "trial": int,
+    "model": str,
+    "reason": str,
+    "solved": bool,
+    "final_mm": _NUMBER,
+    "pushes": int,
+    "decision_s": list,
+    "goal_mm": list,
+    "moved": int,
+    "radius_mm": list,
+    "pusher_radius_mm": _NUMBER,
+    "tolerance_mm": _NUMBER,
+    "table_friction": _NUMBER,
+    "turns": list,
+}
 
 
 def record(
@@ -39,6 +59,24 @@ def record(
         "table_friction": float(robot.scene.table_friction),
         "turns": [_turn(trial, turn) for turn in episode.turns],
     }
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Read the record of an episode.
+
+    Raises:
+        BadInput: it is damaged, or no such record.
+    """
+    again = "delete it and run the same command: that episode is run again"
+    try:
+        found = read_json(path)
+    except BadInput as error:
+        raise BadInput(f"{error} Or {again}.") from None
+    for name, kind in _FIELDS.items():
+        if not isinstance(found.get(name), kind):
+            what = "is missing" if name not in found else f"is {found[name]!r}"
+            raise BadInput(f"{path}: {name} {what}, so it is no episode; {again}.")
+    return found
 
 
 def _turn(trial: "Trial", turn: Turn) -> dict[str, Any]:

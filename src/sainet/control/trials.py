@@ -13,7 +13,7 @@ import numpy as np
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, run_episode
-from sainet.control.record import record
+from sainet.control.record import read_record, record
 from sainet.engines import make_engine
 from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
 from sainet.engines.config import NoiseConfig, at_level
@@ -23,7 +23,7 @@ from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.processes import each_done
 from sainet.robots.simulated import SimulatedRobot
-from sainet.runs import open_run, read_json, write_json
+from sainet.runs import open_run, write_json
 from sainet.scene import TIME_STEP, Scene, State, at_rest
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
@@ -65,19 +65,21 @@ def run_trials(
 
     Raises:
         RunConflict: the folder holds something else.
-        BadInput: the model cannot be used for such pushes.
+        BadInput: the model cannot be used for such pushes, or an episode is damaged.
     """
-    prepare(config)  # what is wrong with it is said before anything is made
-    settings = {"command": "control", **asdict(config)}
+    model, _ = prepare(config)  # what is wrong is said before anything is made
+    # A network that was trained again in the same folder is another model.
+    weights = model.card.weights if model.card else None
+    settings = {"command": "control", "weights": weights, **asdict(config)}
     open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     files = [episode_file(out, trial) for trial in range(config.trials)]
     known = {index for index, path in enumerate(files) if path.is_file()}
     for index in sorted(known):
-        on_episode(read_json(files[index]))
+        on_episode(read_record(files[index]))
     missing = [(config, out, i) for i in range(config.trials) if i not in known]
     for index in each_done(executor, run_trial, missing):
-        on_episode(read_json(files[index]))
-    records = [read_json(path) for path in files]
+        on_episode(read_record(files[index]))
+    records = [read_record(path) for path in files]
     write_json(out / SUMMARY, {"episodes": [str(p.relative_to(out)) for p in files]})
     return records
 
