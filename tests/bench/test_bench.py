@@ -22,7 +22,7 @@ from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import median_seconds
 from sainet.bench.training import TrainingLoop, counted_gflop
 from sainet.errors import BadInput, SainetError, UnknownName
-from sainet.models.features import Drive, FeatureSizes, Still
+from sainet.models.features import Drive, FeatureSizes, Still, in_columns
 from sainet.models.interaction import InteractionNetwork
 from sainet.training.step import trained_layers, with_layers
 
@@ -72,8 +72,8 @@ def test_the_counted_work_is_what_jax_compiles(kind, augmented, bodies):
     )
 
     def loss(layers, motion):
-        step = jax.vmap(with_layers(network, layers).step)
-        return jnp.sum(step(motion, still, drive) ** 2)
+        step = with_layers(network, layers).step
+        return jnp.sum(step(*in_columns((motion, still, drive))) ** 2)
 
     gradient = jax.value_and_grad(loss, argnums=(0, 1))
     motion = jnp.ones((pushes, bodies, 6))

@@ -11,7 +11,7 @@ GRADIENT_BOUND = 5.0  # of a push's loss to its motion in these sizes; about 1 i
 
 
 @jax.custom_vjp
-def bound_gradient(motion: Float[Array, "push body 6"]) -> Float[Array, "push body 6"]:
+def bound_gradient(motion: Float[Array, "6 body push"]) -> Float[Array, "6 body push"]:
     """Return the motion; on the way back, shorten each push's gradient to the bound.
 
     A push whose prediction runs away has a gradient that grows with every step, and
@@ -25,8 +25,8 @@ def _forward(motion: Array) -> tuple[Array, None]:
 
 
 def _backward(_: None, gradient: Array) -> tuple[Array]:
-    sizes = jnp.broadcast_to(jnp.array(GRADIENT_SIZES, gradient.dtype), gradient.shape)
-    squared = jnp.sum((gradient * sizes) ** 2, axis=(-1, -2), keepdims=True)
+    sizes = jnp.array(GRADIENT_SIZES, gradient.dtype)[:, None, None]
+    squared = jnp.sum((gradient * sizes) ** 2, axis=(0, 1), keepdims=True)
     # An overflow is worth nothing: its direction is lost as well.
     share = jnp.minimum(
         1.0, GRADIENT_BOUND * jax.lax.rsqrt(jnp.maximum(squared, 1e-30))

@@ -16,6 +16,7 @@ from sainet.models.features import (
     FeatureSizes,
     Still,
     body_features,
+    in_columns,
     pair_features,
 )
 
@@ -45,16 +46,21 @@ class Layers(eqx.Module):
             biases.append(draw(bias_key, (outputs,), minval=-reach, maxval=reach))
         self.weights, self.biases = tuple(weights), tuple(biases)
 
-    def __call__(self, x: Float[Array, "*row input"]) -> Float[Array, "*row output"]:
-        """Apply the layers to each row."""
-        last = len(self.weights) - 1
+    def __call__(self, x: Float[Array, "input *row"]) -> Float[Array, "output *row"]:
+        """Apply the layers to each column."""
+        last, shape = len(self.weights) - 1, x.shape[1:]
+        x = x.reshape(x.shape[0], -1)
         for index, (weight, bias) in enumerate(
             zip(self.weights, self.biases, strict=True)
         ):
-            x = x @ weight
-            x = x + jnp.broadcast_to(bias, x.shape)
+            x = weight.T @ x + _like(bias, x)
             x = x if index == last else jax.nn.relu(x)
-        return x
+        return x.reshape(-1, *shape)
+
+
+def _like(numbers: Float[Array, " number"], x: Array) -> Array:
+    """Return one number a row of x, to be broadcast over its columns."""
+    return numbers.reshape(-1, *(1,) * (x.ndim - 1))
 
 
 class Scales(eqx.Module):
@@ -100,36 +106,43 @@ class InteractionNetwork(eqx.Module):
         self.time_step = time_step
 
     def acceleration(
-        self, motion: Float[Array, "body 6"], still: Still, drive: Drive
-    ) -> Float[Array, "body 3"]:
+        self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
+    ) -> Float[Array, "3 body push"]:
         """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 5 and 10)."""
         effect = self._effects(motion, still, drive)
         features = body_features(motion, still, drive)
         shown = _standardise(
             features, self.scales.body_mean, self.scales.body_deviation
         )
-        out = self.dyn(jnp.concatenate([shown, effect], axis=-1))
-        return out * jnp.broadcast_to(self.scales.acceleration, out.shape)
+        out = self.dyn(jnp.concatenate([shown, effect]))
+        return out * _like(self.scales.acceleration, out)
 
     def _effects(
-        self, motion: Float[Array, "body 6"], still: Still, drive: Drive
-    ) -> Float[Array, "body effect"]:
+        self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
+    ) -> Float[Array, "effect body push"]:
         """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j)."""
-        if motion.shape[0] == 1:
-            return jnp.zeros((1, EFFECT), motion.dtype)
+        _, bodies, pushes = motion.shape
+        if bodies == 1:
+            return jnp.zeros((EFFECT, bodies, pushes), motion.dtype)
         features = pair_features(motion, still, drive)
         shown = _standardise(
             features, self.scales.pair_mean, self.scales.pair_deviation
         )
-        return jnp.sum(self.rel(shown), axis=0)
+        return jnp.sum(self.rel(shown), axis=1)
 
     def step(
-        self, motion: Float[Array, "body 6"], still: Still, drive: Drive
-    ) -> Float[Array, "body 6"]:
-        """Return the next packed motion: v' = v + dt f_dyn, p' = p + dt v'."""
-        rate = motion[:, 3:6] + self.time_step * self.acceleration(motion, still, drive)
-        pose = motion[:, 0:3] + self.time_step * rate
-        return jnp.concatenate([pose, rate], axis=-1)
+        self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
+    ) -> Float[Array, "6 body push"]:
+        """Return the next packed motion: v' = v + dt f_dyn, p' = p + dt v'.
+
+        Args:
+            motion: of every push, in columns (see `features.in_columns`).
+            still: in columns.
+            drive: in columns.
+        """
+        rate = motion[3:6] + self.time_step * self.acceleration(motion, still, drive)
+        pose = motion[0:3] + self.time_step * rate
+        return jnp.concatenate([pose, rate])
 
 
 def _standardise(x: Array, mean: Array, deviation: Array) -> Array:
@@ -137,8 +150,7 @@ def _standardise(x: Array, mean: Array, deviation: Array) -> Array:
 
     Contacts kick: without the bound, 200 steps of back-propagation explode.
     """
-    shape = x.shape
-    scaled = (x - jnp.broadcast_to(mean, shape)) / jnp.broadcast_to(deviation, shape)
+    scaled = (x - _like(mean, x)) / _like(deviation, x)
     return FEATURE_BOUND * jnp.tanh(scaled / FEATURE_BOUND)
 
 
@@ -170,12 +182,14 @@ def unroll(
     Returns:
         The packed motion after each step, time first.
     """
-    step = jax.vmap(network.step)
+    still = in_columns(still)
 
     @jax.checkpoint
     def body(motion: Array, now: Drive) -> tuple[Array, Array]:
-        motion = step(bound_gradient(motion), still, now)
+        motion = network.step(bound_gradient(motion), still, now)
         return motion, motion
 
     time_first = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    return lax.scan(body, initial, time_first, unroll=_CHECKPOINTED_STEPS)[1]
+    columns = jax.vmap(in_columns)(time_first)
+    path = lax.scan(body, in_columns(initial), columns, unroll=_CHECKPOINTED_STEPS)[1]
+    return jax.vmap(in_columns)(path)

@@ -10,6 +10,7 @@ from sainet.models.features import (
     FeatureSizes,
     body_features,
     drives,
+    in_columns,
     pair_features,
     still_features,
 )
@@ -36,12 +37,13 @@ def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
         simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
     drive = drives(controls_to_frame(batch.controls, frame), start, simulated)
     drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    still = still_features(batch.scene, frame.pushed)
-    over_time = jax.vmap(jax.vmap(body_features), in_axes=(0, None, 0))
-    body_mean, body_deviation = _spread(over_time(before, still, drive))
+    still = in_columns(still_features(batch.scene, frame.pushed))
+    columns = jax.vmap(in_columns)((before, drive))
+    over_time = jax.vmap(lambda now: body_features(now[0], still, now[1]), out_axes=1)
+    body_mean, body_deviation = _spread(over_time(columns))
     if batch.scene.body_count > 1:
-        over_pairs = jax.vmap(jax.vmap(pair_features), in_axes=(0, None, 0))
-        pair_mean, pair_deviation = _spread(over_pairs(before, still, drive))
+        pairs = jax.vmap(lambda now: pair_features(now[0], still, now[1]), out_axes=1)
+        pair_mean, pair_deviation = _spread(pairs(columns))
     else:
         pair_mean, pair_deviation = jnp.zeros(sizes.pair), jnp.ones(sizes.pair)
     change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
@@ -57,10 +59,10 @@ def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
 
 
 def _spread(features: Array) -> tuple[Array, Array]:
-    rows = features.reshape(-1, features.shape[-1])
-    deviation = jnp.std(rows, axis=0)
+    rows = features.reshape(features.shape[0], -1)
+    deviation = jnp.std(rows, axis=1)
     # A feature that never varies, a fixed mass say, must not be divided by zero.
-    return jnp.mean(rows, axis=0), jnp.where(deviation > _CONSTANT, deviation, 1.0)
+    return jnp.mean(rows, axis=1), jnp.where(deviation > _CONSTANT, deviation, 1.0)
 
 
 @eqx.filter_jit
