@@ -19,13 +19,20 @@ def batch_mesh() -> Mesh:
 
 
 @eqx.filter_jit
-def over_devices(function: Callable[..., Any], shared: Any, *batched: Any) -> Any:  # noqa: ANN401
+def over_devices(
+    function: Callable[..., Any],
+    shared: Any,  # noqa: ANN401
+    *batched: Any,  # noqa: ANN401
+    most: int | None = None,
+) -> Any:  # noqa: ANN401
     """Compute ``function(shared, *batched)`` with the batch split over the devices.
 
     Args:
         function: works on any batch size; compiled once for each set of shapes.
         shared: a tree that every device sees whole.
         batched: trees whose arrays have the batch as their first axis.
+        most: rows that a device works on at a time, for what it works on to stay in
+            its cache; None is all of them.
 
     Returns:
         What the function returned, its arrays' first axis being the batch.
@@ -33,12 +40,20 @@ def over_devices(function: Callable[..., Any], shared: Any, *batched: Any) -> An
     arrays, static = eqx.partition((shared, batched), eqx.is_array)
     size = jax.tree.leaves(arrays[1])[0].shape[0]
     devices = jax.device_count()
-    padding = -size % devices
+    rounds = -(-size // (devices * (most or size)))
+    padding = -size % (devices * rounds)
     arrays = (arrays[0], jax.tree.map(lambda x: _pad(x, padding), arrays[1]))
 
-    def local(*arrays: Any) -> Any:  # noqa: ANN401
-        shared, batched = eqx.combine(arrays, static)
-        return function(shared, *batched)
+    def local(shared: Any, batched: Any) -> Any:  # noqa: ANN401
+        def once(part: Any) -> Any:  # noqa: ANN401
+            whole, rows = eqx.combine((shared, part), static)
+            return function(whole, *rows)
+
+        if rounds == 1:
+            return once(batched)
+        parts = jax.tree.map(lambda x: x.reshape(rounds, -1, *x.shape[1:]), batched)
+        found = jax.lax.map(once, parts)
+        return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), found)
 
     sharded = jax.shard_map(
         local,

@@ -15,6 +15,8 @@ from sainet.tasks.base import AbstractTask
 
 SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 
+_AT_ONCE = 1296  # rows: what a network makes of more of them leaves the cache
+
 
 class Outcomes(NamedTuple):
     """Where pushes end, and what a task says of it; rest is taken for granted."""
@@ -54,7 +56,7 @@ def every_push(
     if dynamics.on_host:  # it uses every core by itself
         flat = _judge(shared, *jax.tree.map(jnp.asarray, (rows, each)))
     else:
-        flat = over_devices(_judge, shared, rows, each)
+        flat = over_devices(_judge, shared, rows, each, most=_AT_ONCE)
     flat = jax.device_get(flat)
     return jax.tree.map(lambda x: x.reshape(count, actions, *x.shape[1:]), flat)
 
