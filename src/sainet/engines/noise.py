@@ -5,7 +5,6 @@ Drawn with NumPy from explicit generators, one batch of pushes at a time.
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.signal import lfilter
 
 from sainet.engines.config import NoiseConfig
 
@@ -29,6 +28,9 @@ def ornstein_uhlenbeck(
         correlation_time: s.
         time_step: s.
     """
+    # Here: it takes half a second, which planning and --help need not wait for.
+    from scipy.signal import lfilter
+
     keep = np.exp(-time_step / correlation_time)
     kick = deviation * np.sqrt(1 - keep**2) * rng.standard_normal(shape)
     return np.asarray(lfilter([1.0], [1.0, -keep], kick, axis=1))

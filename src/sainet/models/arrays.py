@@ -27,7 +27,7 @@ def save_arrays(path: Path, tree: Any) -> bytes:  # noqa: ANN401
 
 
 def load_arrays(path: Path, like: Any) -> Any:  # noqa: ANN401
-    """Read a tree of arrays that is shaped like another.
+    """Read a tree of arrays that is shaped like another, of arrays or their shapes.
 
     Raises:
         BadCheckpoint: the file is missing or damaged, or an array does not fit.
@@ -55,11 +55,11 @@ def _take(path: Path, found: dict[str, np.ndarray], where: Any, like: Any) -> An
     if name not in found:
         raise BadCheckpoint(f"{path}: {name} is missing; train the network again.")
     array = found[name]
-    wanted = jnp.asarray(like)
-    if array.shape != wanted.shape or array.dtype != wanted.dtype:
+    shape, dtype = np.shape(like), jnp.result_type(like)
+    if array.shape != shape or array.dtype != dtype:
         raise BadCheckpoint(
             f"{path}: {name} is {array.dtype}{list(array.shape)}, not "
-            f"{wanted.dtype}{list(wanted.shape)}; it belongs to another network."
+            f"{dtype}{list(shape)}; it belongs to another network."
         )
     if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
         raise BadCheckpoint(

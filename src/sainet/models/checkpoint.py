@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import equinox as eqx
 import jax
 
 from sainet.errors import BadCheckpoint
@@ -30,5 +31,9 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
 
 
 def untrained(sizes: FeatureSizes, time_step: float) -> InteractionNetwork:
-    """Return a network whose arrays are to be replaced."""
-    return InteractionNetwork(sizes, time_step=time_step, key=jax.random.key(0))
+    """Return a network of shapes instead of arrays: drawing those takes seconds."""
+
+    def make() -> InteractionNetwork:
+        return InteractionNetwork(sizes, time_step=time_step, key=jax.random.key(0))
+
+    return eqx.filter_eval_shape(make)

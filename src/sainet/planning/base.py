@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
 from sainet.errors import BadScene
 from sainet.models.dynamics import AbstractDynamics
@@ -58,7 +58,7 @@ class AbstractPlanner(eqx.Module):
         Raises:
             BadScene: the observation is not finite, or disks lie in one another.
         """
-        check_observation(scene, state)
+        gap = check_observation(scene, state)
         found = self.search(dynamics, task, scene, state)
         grid = jax.device_get(self.actions.pushes())
         pushes = tuple(jax.tree.map(lambda x, i=i: x[i], grid) for i in found.actions)
@@ -70,7 +70,7 @@ class AbstractPlanner(eqx.Module):
             distance=found.distance,
             looked_at=found.looked_at,
             is_complete=found.is_complete,
-            warnings=tuple(_warnings(scene, state)),
+            warnings=tuple(_warnings(gap)),
         )
 
 
@@ -85,40 +85,54 @@ class Found:
     is_complete: bool = True
 
 
-def check_observation(scene: Scene, state: State) -> None:
-    """Raise `BadScene` if nothing can be planned from what was observed."""
+def check_observation(scene: Scene, state: State) -> float:
+    """Return the least gap between two disks (m), infinite if there is but one.
+
+    Raises:
+        BadScene: nothing can be planned from what was observed.
+    """
     check_state(state, "observation")
-    gap = float(np.min(np.asarray(pair_gaps(scene, state)), initial=np.inf))
+    gap = float(np.min(np.asarray(_compiled_gaps(scene, state)), initial=np.inf))
     if gap < -_DEEPEST_OVERLAP:
         raise BadScene(
             f"observation: two disks overlap by {-1000 * gap:.1f} mm; check the poses "
             "and the radii."
         )
+    return gap
 
 
 def predicted_path(
     dynamics: AbstractDynamics, scene: Scene, state: State, pushes: tuple[Push, ...]
 ) -> Float[np.ndarray, "time body 3"]:
     """Return the poses over all pushes, every push from rest."""
-    roll = roll_pushes if dynamics.on_host else _compiled_roll
-    state = jax.tree.map(lambda x: jnp.asarray(x)[None], state)
+    roll = _path_and_rest if dynamics.on_host else _compiled_path_and_rest
+    state = jax.tree.map(_batch_of_one, state)
     poses = []
     for push in pushes:
-        one = jax.tree.map(lambda x: jnp.asarray(x)[None], push)
-        trajectory = roll(dynamics, batch_of(scene, 1), state, one)
-        states, end = trajectory.states, trajectory.final
-        pose = [states.position, states.angle[..., None]]
-        poses.append(np.concatenate([np.asarray(x)[0] for x in pose], axis=-1))
-        state = at_rest(end.position, end.angle, end.pusher_position)
+        pose, state = roll(dynamics, scene, state, jax.tree.map(_batch_of_one, push))
+        poses.append(np.asarray(pose)[0])
     return np.concatenate(poses)
 
 
-_compiled_roll = eqx.filter_jit(roll_pushes)
+def _batch_of_one(x: Array | np.ndarray | np.generic) -> Array:
+    return jnp.asarray(np.asarray(x)[None])
 
 
-def _warnings(scene: Scene, state: State) -> list[str]:
-    gaps = np.asarray(pair_gaps(scene, state))
-    if scene.body_count > 1 and float(np.min(gaps)) > _APART:
+def _path_and_rest(
+    dynamics: AbstractDynamics, scene: Scene, state: State, push: Push
+) -> tuple[Float[Array, "1 time body 3"], State]:
+    trajectory = roll_pushes(dynamics, batch_of(scene, 1), state, push)
+    states, end = trajectory.states, trajectory.final
+    pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+    return pose, at_rest(end.position, end.angle, end.pusher_position)
+
+
+_compiled_path_and_rest = eqx.filter_jit(_path_and_rest)
+_compiled_gaps = eqx.filter_jit(pair_gaps)
+
+
+def _warnings(gap: float) -> list[str]:
+    if _APART < gap < np.inf:
         return [
             f"no two disks are within {1000 * _APART:g} mm of each other: networks "
             "were trained on disks that touch"
