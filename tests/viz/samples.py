@@ -1,4 +1,4 @@
-"""A push made up by hand: two disks that touch, moved 10 mm, models a little off."""
+"""A push made up by hand: two disks that touch, models a little off; and an episode."""
 
 import numpy as np
 
@@ -116,3 +116,39 @@ def result():
         "interval": [-0.21, -0.11],
     }
     return {"rows": rows, "published": published, "comparisons": [comparison]}
+
+
+def record(pushes=3, **changes):
+    """Return the record of an episode: straight ahead, 10 mm a push, three samples."""
+    turns = [
+        {
+            "observed": [[10.0 * push, 0.0, 0.0], [10.0 * push + 113, 0.0, 0.0]],
+            "actual": [
+                [[10.0 * push + x, 1.0, 2.0], [10.0 * push + 113 + x, 1.0, 2.0]]
+                for x in (3.0, 6.0, 9.0)
+            ],
+            "planned": [
+                [[10.0 * push + x, 1.0, 2.0], [10.0 * push + 113 + x, 1.0, 2.0]]
+                for x in range(10)
+            ],
+            "pusher": [[10.0 * push + x - 59, 0.0] for x in (3.0, 6.0, 9.0)],
+            "distance_mm": 150.0 - 10 * push,
+        }
+        for push in range(pushes)
+    ]
+    known = {
+        "trial": 0,
+        "model": "sain",
+        "turns": turns,
+        "pushes": pushes,
+        "moved": 1,
+        "solved": True,
+        "reason": "solved",
+        "final_mm": 2.34,
+        "final": [[29.0, 1.0, 2.0], [142.0, 1.0, 2.0]],
+        "goal_mm": [150.0, 0.0],
+        "tolerance_mm": 5.9,
+        "radius_mm": [54.0, 59.0],
+        "pusher_radius_mm": 4.8,
+    }
+    return known | changes

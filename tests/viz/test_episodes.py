@@ -1,35 +1,14 @@
 """The figure of episodes."""
 
+import json
 from xml.etree import ElementTree
 
 import numpy as np
 
-from sainet.viz.episodes import MOVED, PUSHED, body_paths, draw_episodes
-
-
-def record(pushes=3, **changes):
-    turns = [
-        {
-            "observed": [[10.0 * push, 0.0, 0.0], [10.0 * push + 113, 0.0, 0.0]],
-            "actual": [
-                [[10.0 * push + x, 1.0, 2.0], [10.0 * push + 113 + x, 1.0, 2.0]]
-                for x in (3.0, 6.0, 9.0)
-            ],
-        }
-        for push in range(pushes)
-    ]
-    known = {
-        "turns": turns,
-        "pushes": pushes,
-        "moved": 1,
-        "solved": True,
-        "reason": "solved",
-        "final_mm": 2.34,
-        "goal_mm": [150.0, 0.0],
-        "tolerance_mm": 5.9,
-        "radius_mm": [54.0, 59.0],
-    }
-    return known | changes
+from sainet.viz.episode_frames import EpisodeFrames, episode_data, outcome
+from sainet.viz.episodes import body_paths, draw_episodes
+from sainet.viz.palette import MOVED, PUSHED
+from viz.samples import record
 
 
 def test_a_path_goes_from_the_first_sight_to_the_end():
@@ -42,13 +21,44 @@ def test_a_path_goes_from_the_first_sight_to_the_end():
 
 def test_every_episode_has_a_panel_and_hostile_words_are_text(tmp_path):
     bad = "<script>alert(1)</script> $x_{"
-    records = [record(), record(pushes=1, solved=False, reason=bad), record(pushes=0)]
+    failed = record(pushes=1, solved=False, reason=bad)
+    records = [record(), failed, record(pushes=0)]
     one, two = (draw_episodes(records, tmp_path / f"{n}.svg") for n in "ab")
     assert one.read_bytes() == two.read_bytes()
     assert ElementTree.parse(one).getroot().tag.endswith("svg")
     text = one.read_text()
     assert "<script" not in text
-    for said in ("3 pushes, solved, 2.3 mm off", "1 pushes, &lt;script"):
+    for said in ("solved with 3 pushes, 2.3 mm off", "&lt;script"):
         assert said in text
     assert PUSHED in text
     assert MOVED in text
+
+
+def test_frames_are_what_was_seen_push_after_push():
+    frames = EpisodeFrames(record())
+    assert frames.starts == [0, 4, 8]
+    assert frames.poses.shape == (3 * 4, 2, 3)
+    np.testing.assert_array_equal(frames.poses[4:8, 0, 0], [10, 13, 16, 19])
+    assert len(frames.pusher) == len(frames.poses)
+    assert [frames.turn_at(frame) for frame in (0, 3, 4, 11)] == [0, 0, 1, 2]
+    assert frames.distances == [150.0, 140.0, 130.0, 2.34]
+    last = [plan[-1, 1].tolist() for plan in frames.plans]
+    assert last == [[10.0 * push + 122, 1.0] for push in range(3)]
+
+
+def test_an_episode_without_a_push_has_one_frame():
+    frames = EpisodeFrames(record(pushes=0))
+    assert (len(frames.poses), frames.starts, frames.turn_at(0)) == (1, [], -1)
+    data = episode_data(record(pushes=0))
+    assert data["steps"] == 0
+    assert data["pusher"] == {"x": [None], "y": [None]}
+    json.dumps(data, allow_nan=False)
+
+
+def test_the_end_is_told_by_where_the_disk_truly_is():
+    assert outcome(record()) == "solved with 3 pushes"
+    assert outcome(record(pushes=1)) == "solved with 1 push"
+    seen = record(solved=False, reason="solved")
+    assert outcome(seen) == "not at the goal after 3 pushes"
+    lost = record(solved=False, reason="out of pushes")
+    assert outcome(lost) == "out of pushes after 3 pushes"

@@ -52,6 +52,7 @@ def folder(tmp_path):
         table=samples.result(),
         figures=[(figure, "Paths of one push.")],
         replays=[samples.replay()],
+        episodes=[samples.record(), samples.record(pushes=0)],
     )
     write_report(report, tmp_path / "report.html")
     return tmp_path
@@ -64,17 +65,17 @@ def still(chromium, folder):
         yield driver
 
 
-def element(driver, name):
-    return driver.find_element("id", f"replay-0-{name}")
+def element(driver, name, block="replay-0"):
+    return driver.find_element("id", f"{block}-{name}")
 
 
 def milliseconds(driver):
     return int(element(driver, "time").text.removesuffix(" ms"))
 
 
-def pixels(driver, name="canvas"):
+def pixels(driver, name="canvas", block="replay-0"):
     return driver.execute_script(
-        "return document.getElementById(arguments[0]).toDataURL()", f"replay-0-{name}"
+        "return document.getElementById(arguments[0]).toDataURL()", f"{block}-{name}"
     )
 
 
@@ -89,11 +90,11 @@ def wait_until(condition, seconds=10.0):
         time.sleep(0.05)
 
 
-def scrub_to(driver, step):
+def scrub_to(driver, step, block="replay-0"):
     driver.execute_script(
         "arguments[0].value = arguments[1];"
         "arguments[0].dispatchEvent(new Event('input', { bubbles: true }));",
-        element(driver, "scrub"),
+        element(driver, "scrub", block),
         step,
     )
 
@@ -158,6 +159,29 @@ def test_it_starts_over_at_the_end(still):
     element(still, "play").click()
     wait_until(lambda: milliseconds(still) < 700)
     assert is_playing(still)
+
+
+def test_an_episode_is_told_push_by_push(still):
+    block = "episode-0"
+    status = element(still, "status", block)
+    assert status.text == "push 1 of 3: disk 2 is 150.0 mm from its goal"
+    scene, chart = (pixels(still, name, block) for name in ("canvas", "chart"))
+    scrub_to(still, 5, block)
+    assert status.text == "push 2 of 3: disk 2 is 140.0 mm from its goal"
+    assert pixels(still, "canvas", block) != scene
+    assert pixels(still, "chart", block) != chart
+    scrub_to(still, 11, block)
+    assert status.text == "solved with 3 pushes: disk 2 is 2.3 mm from its goal"
+    assert milliseconds(still) == 0  # the other player is left alone
+
+
+def test_an_episode_plays_to_its_end_and_one_without_a_push_stands_still(still):
+    element(still, "play", "episode-0").click()
+    status = element(still, "status", "episode-0")
+    wait_until(lambda: status.text.startswith("solved"))
+    scrub_to(still, 0, "episode-1")
+    ended = element(still, "status", "episode-1").text
+    assert ended == "solved with 0 pushes: disk 2 is 2.3 mm from its goal"
 
 
 def test_nothing_is_wider_than_a_phone(still):

@@ -1,6 +1,6 @@
 """`sainet control`."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.control.config import ControlConfig
 from sainet.processes import worker_pool
+from sainet.runs import MANIFEST, read_json
 
 _DRAWN = 6  # episodes
 
@@ -21,6 +22,9 @@ class Control:
     out: Path = Path("runs/control")
     """Run folder to write, a file for each episode; the same settings go on where they
     stopped."""
+    animate: bool = False
+    """Also draw a film of the first episode (MP4 with the extra `video`, else GIF) and
+    replay.html, a page that plays the first six."""
     workers: int | None = None
     """Processes; default: one a core. The result does not depend on it."""
     output: Output = field(default_factory=Output)
@@ -45,6 +49,8 @@ class Control:
 
             records = run_trials(config, self.out, executor=pool, on_episode=on_episode)
         figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
+        if self.animate:
+            self._animate(records[:_DRAWN])
         found = summarise(records)
         low, high = found["interval"]
         self.output.say(
@@ -58,3 +64,33 @@ class Control:
             for name in ("model", "goals", "planner", "world")
         }
         return names | found | {"episodes": str(self.out / "episodes")}
+
+    def _animate(self, records: list[dict[str, Any]]) -> None:
+        from sainet.viz.report import Report, write_report
+        from sainet.viz.video import best_format, frame_count, write_film
+
+        first = records[0]
+        film = self.out / f"episode-000{best_format()}"
+        with progress_bar("Drawing", frame_count(first), self.output) as advance:
+            write_film(first, film, on_frame=lambda: advance(1, film.name))
+        config = self.config
+        report = Report(
+            title=f"{config.planner.capitalize()} search, {config.goals} goals",
+            subtitle=f"{config.model} plans, the world is simulated in {config.world}",
+            episodes=records,
+            manifest=read_json(self.out / MANIFEST),
+            commands=(_command(config),),
+        )
+        page = write_report(report, self.out / "replay.html")
+        self.output.say(f"{film} shows the first episode; {page} plays {len(records)}.")
+
+
+def _command(config: ControlConfig) -> str:
+    """Return the command that these settings come from."""
+    usual = ControlConfig()
+    told = [
+        f"--{name.replace('_', '-')} {value}"
+        for name, value in asdict(config).items()
+        if value != getattr(usual, name)
+    ]
+    return " ".join(["sainet control", *told, "--animate"])

@@ -9,6 +9,7 @@ from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
 from sainet.errors import BadInput
 from sainet.runs import read_json
+from sainet.scene import State
 
 if TYPE_CHECKING:
     from sainet.control.trials import Trial
@@ -22,6 +23,7 @@ _FIELDS: dict[str, type | tuple[type, ...]] = {
     "solved": bool,
     "final_mm": _NUMBER,
     "pushes": int,
+    "final": list,
     "decision_s": list,
     "goal_mm": list,
     "moved": int,
@@ -50,6 +52,7 @@ def record(
         "solved": bool(task.is_solved(robot.scene, robot.truth)),
         "final_mm": final,
         "pushes": len(episode.turns),
+        "final": _poses(poses_of(robot.truth)),
         "decision_s": [turn.seconds for turn in episode.turns],
         "goal_mm": _mm(task.goal),
         "moved": task.moved,
@@ -86,7 +89,7 @@ def _turn(trial: "Trial", turn: Turn) -> dict[str, Any]:
         "direction_deg": _degrees(push.direction),
         "length_mm": 1000 * float(push.length),
         "speed_mm_s": 1000 * float(push.speed),
-        "observed": _poses(_pose(turn)),
+        "observed": _poses(poses_of(turn.observed)),
         "distance_mm": 1000 * float(trial.task.distance(turn.observed)),
         "planned_pushes": len(plan.pushes),
         "planned": _poses(plan.path[_EVERY - 1 :: _EVERY]),
@@ -100,8 +103,8 @@ def _turn(trial: "Trial", turn: Turn) -> dict[str, Any]:
     }
 
 
-def _pose(turn: Turn) -> np.ndarray:
-    state = turn.observed
+def poses_of(state: State) -> np.ndarray:
+    """Return each disk's place and angle, ``[body, 3]`` (m, m, rad)."""
     return np.concatenate(
         [np.asarray(state.position), np.asarray(state.angle)[..., None]], axis=-1
     )

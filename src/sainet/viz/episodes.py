@@ -10,10 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from sainet.viz.canvas import house_look, new_figure, save
-from sainet.viz.palette import INK
+from sainet.viz.episode_frames import outcome
+from sainet.viz.palette import INK, MOVED, OTHER, PUSHED, TARGET
 
-PUSHED, MOVED, OTHER = "#c8553d", "#2a6fb5", "#8b8f94"  # red, blue as in the paper
-TARGET = "#f0c808"
 _ACROSS = 3  # panels
 
 Record = Mapping[str, Any]
@@ -54,10 +53,7 @@ def draw_episode(axes: Axes, record: Record) -> None:
     _disk(axes, record["goal_mm"], record["tolerance_mm"], facecolor=TARGET, zorder=4)
     end = path[-1, record["moved"], :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
-    said = "solved" if record["solved"] else record["reason"]
-    axes.set_title(
-        f"{record['pushes']} pushes, {said}, {record['final_mm']:.1f} mm off"
-    )
+    axes.set_title(f"{outcome(record)}, {record['final_mm']:.1f} mm off")
     axes.set_aspect("equal")
     axes.autoscale_view()
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
@@ -67,7 +63,7 @@ def body_paths(record: Record) -> np.ndarray:
     """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg)."""
     turns = record["turns"]
     if not turns:
-        return np.zeros((1, len(record["radius_mm"]), 3))
+        return np.asarray([record["final"]], float)
     return np.concatenate(
         [np.asarray([turns[0]["observed"]]), *(np.asarray(t["actual"]) for t in turns)]
     )

@@ -12,6 +12,14 @@ INK = "#2f3437"  # text, axes and the truth
 PAPER = "#ffffff"
 DARK_INK = "#e4e2dd"
 DARK_PAPER = "#16191d"
+# Disks of an episode, as in the paper's figure: pushed red, moved blue, goal yellow.
+PUSHED, MOVED, OTHER, TARGET = "#c8553d", "#2a6fb5", "#8b8f94", "#f0c808"
+_EPISODE = {
+    "--pushed": (PUSHED, "#ef8a72"),
+    "--moved": (MOVED, "#6fb0ee"),
+    "--other": (OTHER, "#9aa0a6"),
+    "--target": (TARGET, "#d9b40a"),
+}
 _LONGEST = 28  # characters of a label; of a longer name, a folder say, the end counts
 
 
@@ -80,7 +88,8 @@ def css_variables(*, dark: bool) -> dict[str, str]:
     ink, paper = (DARK_INK, DARK_PAPER) if dark else (INK, PAPER)
     pairs = [(style.color, style.dark) for style in _KNOWN.values()]
     variables = {f"--model-{pair[0][1:]}": pair[dark] for pair in (*pairs, *_SPARE)}
-    return {"--ink": ink, "--paper": paper, **variables}
+    disks = {name: pair[dark] for name, pair in _EPISODE.items()}
+    return {"--ink": ink, "--paper": paper, **disks, **variables}
 
 
 def _spare_style(name: str, taken: set[int]) -> ModelStyle:

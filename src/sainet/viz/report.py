@@ -11,12 +11,13 @@ import numpy as np
 from markupsafe import Markup
 
 from sainet.runs import write_bytes
+from sainet.viz.episode_frames import episode_data
 from sainet.viz.palette import css_variables, styles_of
 from sainet.viz.replay import Replay, Track
 from sainet.viz.tables import to_html
 from sainet.viz.templates import read, render
 
-_SCRIPTS = ("motion.js", "draw.js", "replay.js")
+_SCRIPTS = ("motion.js", "draw.js", "transport.js", "replay.js", "episode.js")
 _DECIMALS_MM = 3
 _PIXELS_PER_POINT = 1.4
 _DECIMALS_RAD = 5
@@ -33,6 +34,7 @@ class Report:
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
     replays: Sequence[Replay] = ()
+    episodes: Sequence[Mapping[str, Any]] = ()  # records of `sainet control`
     manifest: Mapping[str, Any] = field(default_factory=dict)
     commands: Sequence[str] = ()
 
@@ -50,6 +52,7 @@ def to_page(report: Report) -> str:
         report=report,
         paragraphs=[text for text in re.split(r"\n\s*\n", report.summary) if text],
         replays=[replay_data(replay) for replay in report.replays],
+        episodes=[episode_data(record) for record in report.episodes],
         table=Markup(to_html(report.table)) if report.table else "",
         figures=list(_pictures(report.figures)),
         manifest=list(_flatten(report.manifest)),
