@@ -132,7 +132,7 @@ def test_shipped_networks_are_compared_where_they_fit(pushes):
 def test_control(tmp_path):
     out, cache = tmp_path / "out", tmp_path / "cache"
     words = ("control", "--model", "physics", "--trials", 2, "--pushes", 1)
-    words += ("--goals", "hard", "--out", out, "--json", "--quiet")
+    words += ("--goals", "hard", "--animate", "--out", out, "--json", "--quiet")
     done = sainet(*words, JAX_COMPILATION_CACHE_DIR=str(cache))
     result = json.loads(done.stdout.splitlines()[-1])
     named = {name: result[name] for name in ("model", "goals", "planner", "world")}
@@ -144,7 +144,10 @@ def test_control(tmp_path):
     assert names <= result.keys()
     assert len(list(Path(result["episodes"]).glob("*.json"))) == 2
     assert list(cache.rglob("*-cache"))  # what was compiled is kept
-    assert (out / "episodes.svg").stat().st_size > 0
+    for name in ("episodes.svg", "episode-000.mp4", "replay.html"):
+        assert (out / name).stat().st_size > 0
+    command = "sainet control --model physics --goals hard --trials 2 --pushes 1"
+    assert f"{command} --animate" in (out / "replay.html").read_text()
     error = sainet("control", "--model", "no", "--out", tmp_path / "x", status=2).stderr
     assert error.startswith("sainet: No model named 'no'")
     assert not (tmp_path / "x").exists()

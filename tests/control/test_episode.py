@@ -8,7 +8,7 @@ import pytest
 
 from models.samples import Glide
 from planning.scenes import goal_ahead, scene, touching
-from sainet.control.episode import Episode, distances, run_episode
+from sainet.control.episode import Episode, checked, distances, run_episode
 from sainet.errors import BadScene
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.base import AbstractPlanner, Found, Plan
@@ -89,6 +89,35 @@ def test_a_robot_in_trouble_is_not_asked_for_ever():
     episode = run(Rail(step=0.0, trouble="disk 1 did not move"))
     assert episode.reason == "disk 1 did not move, 3 times in a row"
     assert len(episode.turns) == 3
+
+
+class Contrary(Rail):
+    """Pushes along another way than it was asked to, and says so."""
+
+    def push(self, push):
+        other = eqx.tree_at(lambda p: p.direction, push, push.direction + 0.3)
+        return super().push(other)
+
+
+def test_a_robot_that_pushes_otherwise_is_found_out():
+    episode = run(Contrary(step=0.001))
+    assert episode.reason.startswith("the robot pushed otherwise: its direction is off")
+    assert len(episode.turns) == 3
+
+
+def test_a_recording_that_is_no_number_is_trouble():
+    push = jax.tree.map(lambda x: x[0], PushGrid().pushes())
+    blind = Recording(push, np.full((1, 2, 3), np.nan), np.zeros((1, 2)))
+    assert checked(blind, push).trouble == "the recording holds NaN or infinity"
+    whole = Recording(push, np.zeros((1, 2, 3)), np.zeros((1, 2)))
+    assert checked(whole, push) is whole
+
+
+def test_a_goal_out_of_reach_is_named_as_the_reason():
+    episode = run(Rail(step=0.001), pushes=3)
+    assert episode.reason == (
+        "out of pushes: the goal was 50 mm away, out of reach of 3 pushes of 10 mm"
+    )
 
 
 def test_an_observation_that_is_no_number_ends_it_with_the_reason():

@@ -2,6 +2,9 @@
 
 import json
 import shutil
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -32,7 +35,7 @@ def test_an_episode_is_a_file_that_tells_everything(done):
     assert [r["trial"] for r in records] == [0, 1]
     for index, record in enumerate(records):
         assert json.loads(episode_file(out, index).read_text()) == record
-        assert record["reason"] == "out of pushes"
+        assert record["reason"].startswith("out of pushes: the goal was 177 mm away")
         assert len(record["turns"]) == record["pushes"] == 2
         turn = record["turns"][0]
         assert np.shape(turn["actual"]) == (25, 2, 3)
@@ -96,6 +99,39 @@ def test_an_interrupted_episode_is_kept_beside(tmp_path, monkeypatch):
     left = json.loads((tmp_path / "out/episodes/000.interrupted.json").read_text())
     assert left["reason"] == "interrupted"
     assert not episode_file(tmp_path / "out", 0).exists()
+
+
+_TELLING = """
+import functools, pathlib, sys
+from sainet.control import trials
+trials.run_episode = functools.partial(
+    trials.run_episode, on_turn=lambda turn: print("pushed", flush=True)
+)
+config = trials.ControlConfig(model="physics", trials=1, pushes=60)
+trials.run_trials(config, pathlib.Path(sys.argv[1]))
+"""
+
+
+@pytest.mark.slow
+def test_a_process_that_is_interrupted_keeps_its_pushes_and_the_next_one_starts_over(
+    tmp_path,
+):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", _TELLING, str(out)]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert child.stdout is not None
+    for _ in range(3):
+        assert child.stdout.readline() == "pushed\n"
+    child.send_signal(signal.SIGINT)
+    child.communicate(timeout=60)
+    assert child.returncode not in (0, -signal.SIGKILL)
+    left = json.loads((out / "episodes/000.interrupted.json").read_text())
+    assert left["reason"] == "interrupted"
+    assert left["pushes"] == len(left["turns"]) >= 3
+    assert not episode_file(out, 0).exists()
+    whole = run_trials(replace(CONFIG, trials=1, pushes=60), out)[0]
+    assert without_times(whole["turns"][0]) == without_times(left["turns"][0])
+    assert not (out / "episodes/000.interrupted.json").exists()
 
 
 def test_models_see_the_same_worlds_and_their_own_properties():

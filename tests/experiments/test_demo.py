@@ -44,6 +44,9 @@ def test_the_report_of_the_demo_plays(demo, chromium):
         before = milliseconds(driver)
         element(driver, "play").click()
         WebDriverWait(driver, 20).until(lambda page: milliseconds(page) > before)
+        for block, goals in enumerate(("easy", "hard")):
+            title = element(driver, "title", f"episode-{block}").text
+            assert title.startswith(f"SAIN, {goals} goal 1: solved with ")
 
 
 def test_an_unknown_experiment_lists_the_known():

@@ -1,6 +1,7 @@
 """Planners against a naive search, and against input that cannot be planned from."""
 
 import itertools
+from dataclasses import replace
 from functools import lru_cache
 
 import equinox as eqx
@@ -9,9 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from models.samples import quick_dynamics
 from planning.scenes import FEW, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
-from sainet.errors import BadInput, BadScene, UnknownName
+from sainet.errors import BadCheckpoint, BadInput, BadScene, UnknownName
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.greedy import GreedyPlanner
@@ -176,13 +178,38 @@ def test_an_observation_with_nan_is_refused(name, field):
 
 
 @every_planner
-def test_disks_in_one_another_are_refused_and_disks_apart_are_told_of(name):
+def test_disks_in_one_another_are_refused(name):
     planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
     with pytest.raises(BadScene, match="overlap by 8.0 mm"):
         planner.plan(PHYSICS, FAR, SCENE, touching(-0.008))
     assert planner.plan(PHYSICS, FAR, SCENE, touching(-0.0005)).warnings == ()
-    (warning,) = planner.plan(PHYSICS, FAR, SCENE, touching(0.02)).warnings
+
+
+def doubtful(dynamics, state=None, actions=FEW):
+    planner = eqx.tree_at(lambda p: p.actions, make_planner("tree"), actions)
+    return planner.plan(dynamics, FAR, SCENE, state or touching()).warnings
+
+
+def test_a_plan_says_when_its_network_has_not_seen_the_like():
+    network = quick_dynamics("in", "robot")
+    assert doubtful(network) == ()
+    (warning,) = doubtful(network, touching(0.02))
     assert "disks that touch" in warning
+    assert doubtful(PHYSICS, touching(0.02)) == ()  # an engine was not trained
+    wide = replace(FEW, contact_range=6 * np.pi / 7, length=0.02)
+    found = doubtful(network, actions=wide)
+    assert any("length" in warning for warning in found)
+    assert any("contact angle" in warning for warning in found)
+
+
+def test_a_network_for_something_else_is_refused_before_it_plans_wrongly():
+    with pytest.raises(BadCheckpoint, match="for direct-force pushes"):
+        doubtful(quick_dynamics("in", "direct-force"))
+    slow = replace(SCENE, time_step=0.01)
+    with pytest.raises(
+        BadCheckpoint, match=r"steps of 0.00416\d+ s, the scene's are 0.01"
+    ):
+        make_planner("tree").plan(quick_dynamics("in", "robot"), FAR, slow, STATE)
 
 
 def test_planners_by_name():

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -10,11 +10,19 @@ from jaxtyping import Float
 from sainet.errors import BadScene
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Plan
+from sainet.pushes import Push
 from sainet.robots.base import AbstractRobot, Recording
 from sainet.scene import Scene, State
 from sainet.tasks.base import AbstractTask
 
 _MOST_TROUBLES = 3  # in a row
+# How far a push may be from the one that was asked for.
+_TOLERANCES = (
+    ("contact_angle", np.deg2rad(5), "rad"),
+    ("direction", np.deg2rad(5), "rad"),
+    ("length", 1e-3, "m"),
+    ("speed", 5e-3, "m/s"),
+)
 
 
 @dataclass(frozen=True)
@@ -69,19 +77,55 @@ def run_episode(
         if bool(np.isfinite(state.position).all() and task.is_solved(scene, state)):
             return _end(episode, "solved")
         if len(episode.turns) == pushes:
-            return _end(episode, "out of pushes")
+            return _end(episode, _out_of_pushes(task, planner, episode, pushes))
         start = time.perf_counter()
         try:
             plan = planner.plan(dynamics, task, scene, state)
         except BadScene as error:
             return _end(episode, str(error))
         seconds = time.perf_counter() - start
-        turn = Turn(state, plan, robot.push(plan.pushes[0]), seconds)
+        recording = checked(robot.push(plan.pushes[0]), plan.pushes[0])
+        turn = Turn(state, plan, recording, seconds)
         episode.turns.append(turn)
         on_turn(turn)
         troubles = troubles + 1 if turn.recording.trouble else 0
         if troubles == _MOST_TROUBLES:
             return _end(episode, f"{turn.recording.trouble}, {troubles} times in a row")
+
+
+def checked(recording: Recording, asked: Push) -> Recording:
+    """Return a recording that says so if it is not of the push that was asked for.
+
+    The model predicted another push: what it says of the next one may be as wrong.
+    """
+    if recording.trouble:
+        return recording
+    if not np.isfinite(recording.path).all():
+        return replace(recording, trouble="the recording holds NaN or infinity")
+    for name, tolerance, unit in _TOLERANCES:
+        off = abs(float(getattr(recording.push, name)) - float(getattr(asked, name)))
+        if off > tolerance:
+            named = name.replace("_", " ")
+            return replace(
+                recording,
+                trouble=f"the robot pushed otherwise: its {named} is off by "
+                f"{off:.3g} {unit}",
+            )
+    return recording
+
+
+def _out_of_pushes(
+    task: AbstractTask, planner: AbstractPlanner, episode: Episode, pushes: int
+) -> str:
+    """Say that the pushes are used up, and whether they could ever have been enough."""
+    reach = pushes * planner.actions.length
+    away = float(task.distance(episode.turns[0].observed))
+    if reach >= away:
+        return "out of pushes"
+    return (
+        f"out of pushes: the goal was {1000 * away:.0f} mm away, out of reach of "
+        f"{pushes} pushes of {1000 * planner.actions.length:g} mm"
+    )
 
 
 def _end(episode: Episode, reason: str) -> Episode:

@@ -19,6 +19,7 @@ _NUMBER = (int, float)
 _FIELDS: dict[str, type | tuple[type, ...]] = {
     "trial": int,
     "model": str,
+    "goals": str,
     "reason": str,
     "solved": bool,
     "final_mm": _NUMBER,
@@ -48,6 +49,7 @@ def record(
     return {
         "trial": index,
         "model": config.model,
+        "goals": config.goals,
         "reason": episode.reason,
         "solved": bool(task.is_solved(robot.scene, robot.truth)),
         "final_mm": final,

@@ -1,7 +1,7 @@
 """Dynamics models behind one `predict`: physics, the network, and both together."""
 
 from abc import abstractmethod
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -22,6 +22,13 @@ from sainet.pushes import Controls, PathControls
 from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
 
 
+class Purpose(NamedTuple):
+    """What a network was made for."""
+
+    kind: str  # of the controls
+    time_step: float  # s
+
+
 class AbstractDynamics(eqx.Module):
     """Predicts how scenes move; all arguments share one leading batch axis.
 
@@ -33,6 +40,11 @@ class AbstractDynamics(eqx.Module):
     def on_host(self) -> bool:
         """Whether an engine in it works outside JAX: then only parts are compiled."""
         return False
+
+    @property
+    def made_for(self) -> Purpose | None:
+        """What the network in it was made for; None if there is no network in it."""
+        return None
 
     @abstractmethod
     def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
@@ -82,6 +94,11 @@ class LearnedDynamics(AbstractDynamics):
 
     network: InteractionNetwork
 
+    @property
+    def made_for(self) -> Purpose:
+        """What the network was made for."""
+        return _purpose(self.network)
+
     def begin(self, scene: Scene, state: State) -> LearnedCarry:
         """Start at the state, in the frame of its push."""
         return LearnedCarry(state, push_frame(scene, state))
@@ -116,6 +133,11 @@ class SimulatorAugmented(AbstractDynamics):
         """Whether the engine works outside JAX."""
         return self.engine.on_host
 
+    @property
+    def made_for(self) -> Purpose:
+        """What the network was made for."""
+        return _purpose(self.network)
+
     def begin(self, scene: Scene, state: State) -> HybridCarry:
         """Start both predictions at the state (eq. 2: s-bar0 = s-hat0 = s0)."""
         return HybridCarry(state, state, push_frame(scene, state))
@@ -136,6 +158,10 @@ class SimulatorAugmented(AbstractDynamics):
             simulated=s_bar,
         )
         return HybridCarry(simulated.final, trajectory.final, carry.frame), trajectory
+
+
+def _purpose(network: InteractionNetwork) -> Purpose:
+    return Purpose(network.sizes.kind, network.time_step)
 
 
 def predict_motion(

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jax import lax
 
 from sainet.errors import BadInput
-from sainet.models.dynamics import AbstractDynamics
+from sainet.models.dynamics import AbstractDynamics, Purpose
 from sainet.pushes import Controls, PathControls
 from sainet.scene import Scene, State, Trajectory
 
@@ -18,6 +18,11 @@ class Restarted(AbstractDynamics):
     """
 
     model: AbstractDynamics
+
+    @property
+    def made_for(self) -> Purpose | None:
+        """What the network in the model was made for."""
+        return self.model.made_for
 
     def begin(self, scene: Scene, state: State) -> State:
         """Start at the state; nothing else is remembered."""

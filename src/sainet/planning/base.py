@@ -9,15 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.errors import BadScene
 from sainet.models.dynamics import AbstractDynamics
+from sainet.planning.checks import check_model, check_observation, doubts
 from sainet.planning.outcomes import batch_of, roll_pushes
 from sainet.pushes import Push, PushGrid
-from sainet.scene import Scene, State, at_rest, check_state, pair_gaps
+from sainet.scene import Scene, State, at_rest
 from sainet.tasks.base import AbstractTask
-
-_DEEPEST_OVERLAP = 5e-3  # m, of disks that were seen; more is no noise of a camera
-_APART = 5e-3  # m: networks were trained on disks that touch
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,9 @@ class AbstractPlanner(eqx.Module):
 
         Raises:
             BadScene: the observation is not finite, or disks lie in one another.
+            BadCheckpoint: the model is for another time step or for other controls.
         """
+        check_model(dynamics, scene)
         gap = check_observation(scene, state)
         found = self.search(dynamics, task, scene, state)
         grid = jax.device_get(self.actions.pushes())
@@ -70,7 +69,7 @@ class AbstractPlanner(eqx.Module):
             distance=found.distance,
             looked_at=found.looked_at,
             is_complete=found.is_complete,
-            warnings=tuple(_warnings(gap)),
+            warnings=tuple(doubts(dynamics, gap, pushes)),
         )
 
 
@@ -83,22 +82,6 @@ class Found:
     distance: float  # m
     looked_at: int
     is_complete: bool = True
-
-
-def check_observation(scene: Scene, state: State) -> float:
-    """Return the least gap between two disks (m), infinite if there is but one.
-
-    Raises:
-        BadScene: nothing can be planned from what was observed.
-    """
-    check_state(state, "observation")
-    gap = float(np.min(np.asarray(_compiled_gaps(scene, state)), initial=np.inf))
-    if gap < -_DEEPEST_OVERLAP:
-        raise BadScene(
-            f"observation: two disks overlap by {-1000 * gap:.1f} mm; check the poses "
-            "and the radii."
-        )
-    return gap
 
 
 def predicted_path(
@@ -128,13 +111,3 @@ def _path_and_rest(
 
 
 _compiled_path_and_rest = eqx.filter_jit(_path_and_rest)
-_compiled_gaps = eqx.filter_jit(pair_gaps)
-
-
-def _warnings(gap: float) -> list[str]:
-    if _APART < gap < np.inf:
-        return [
-            f"no two disks are within {1000 * _APART:g} mm of each other: networks "
-            "were trained on disks that touch"
-        ]
-    return []

@@ -79,7 +79,7 @@ class EpisodeFrames:
 def episode_title(record: Record) -> str:
     """Return who pushes, and how it ended."""
     model = style_of(record["model"]).label
-    return f"{model}, goal {record['trial'] + 1}: {outcome(record)}"
+    return f"{model}, {record['goals']} goal {record['trial'] + 1}: {outcome(record)}"
 
 
 def outcome(record: Record) -> str:

@@ -81,9 +81,9 @@ def draw_frames(record: Record) -> Iterator[Frame]:
     """Yield the pictures of a film, thirty a second."""
     with house_look():
         stage = _Stage(record)
-        for frame in range(len(stage.frames.poses)):
-            yield (picture := stage.picture(frame))
-        yield from repeat(picture, _HOLD)
+        last = len(stage.frames.poses) - 1
+        yield from map(stage.picture, range(last))
+        yield from repeat(stage.picture(last), 1 + _HOLD)
 
 
 class _Stage:
