@@ -1,0 +1,50 @@
+"""Push the second disk to a goal with the SAIN that ships, in a simulated world."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from sainet import Scene, load_dynamics
+from sainet.control.episode import Turn, run_episode
+from sainet.engines import make_engine
+from sainet.engines.config import NoiseConfig
+from sainet.planning import make_planner
+from sainet.robots.simulated import SimulatedRobot
+from sainet.scene import at_rest
+from sainet.tasks.push_to_goal import PushToGoal
+
+# The world: rough, noisy, and with a friction that nobody tells the model.
+radius = jnp.array([0.054, 0.059])
+scene = Scene(
+    mass=jnp.array([0.9, 1.0]),
+    radius=radius,
+    table_friction=jnp.array(0.12),
+    disk_friction=jnp.array(0.25),
+    pusher_friction=jnp.array(0.25),
+    pusher_radius=jnp.array(0.0048),
+)
+touching = jnp.array([[0.0, 0.0], [radius.sum(), 0.0]])
+state = at_rest(touching, jnp.zeros(2), jnp.array([-0.1, 0.0]))
+robot = SimulatedRobot(
+    make_engine("planar"),
+    scene,
+    state,
+    noise=NoiseConfig(),
+    rng=np.random.default_rng(0),
+)
+
+# The goal: 100 mm ahead of disk 2, 20 mm to the side.
+task = PushToGoal(touching[1] + jnp.array([0.10, 0.02]))
+
+
+def tell(turn: Turn) -> None:
+    """Say what was planned and how far the goal was."""
+    push = np.rad2deg(
+        [turn.plan.pushes[0].contact_angle, turn.plan.pushes[0].direction]
+    )
+    away = 1000 * task.distance(turn.observed)
+    print(f"{away:6.1f} mm to go: contact {push[0]:+.0f}, direction {push[1]:+.0f} deg")
+
+
+sain = load_dynamics("sain").dynamics
+episode = run_episode(robot, make_planner("greedy"), sain, task, scene, on_turn=tell)
+print(f"{episode.reason} after {len(episode.turns)} pushes")
