@@ -1,6 +1,6 @@
 """Reading a store: checked when it is opened, then read in parts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,7 +23,7 @@ class Store:
 
     path: Path
     info: StoreInfo
-    is_cut: bool = False  # to its first pushes
+    rows: tuple[int, ...] | None = None  # of the pushes that are chosen; None: all
 
     def first(self, pushes: int) -> "Store":
         """Return the store cut to its first pushes.
@@ -33,9 +33,26 @@ class Store:
         """
         if not 1 <= pushes <= self.info.pushes:
             raise BadInput(f"{self.path} has {self.info.pushes} pushes, not {pushes}.")
-        if pushes == self.info.pushes:
-            return self
-        return replace(self, info=replace(self.info, pushes=pushes), is_cut=True)
+        return self if pushes == self.info.pushes else self.take(range(pushes))
+
+    def take(self, rows: Iterable[int]) -> "Store":
+        """Return the store with some of its pushes alone, in that order.
+
+        Raises:
+            BadInput: there are none, or one is not there.
+        """
+        every = range(self.info.pushes) if self.rows is None else self.rows
+        rows = [int(row) for row in rows]
+        if not rows:
+            raise BadInput(f"{self.path}: no push is left to work on.")
+        if not 0 <= min(rows) <= max(rows) < self.info.pushes:
+            raise BadInput(
+                f"{self.path} has {self.info.pushes} pushes; there is no push "
+                f"{max(rows) if min(rows) >= 0 else min(rows)}."
+            )
+        chosen = tuple(every[row] for row in rows)
+        info = replace(self.info, pushes=len(chosen))
+        return replace(self, info=info, rows=chosen)
 
     @cached_property
     def _group(self) -> Any:  # noqa: ANN401
@@ -49,22 +66,31 @@ class Store:
         """Return some pushes of the named arrays (default: all) as NumPy arrays."""
         chosen = names or tuple(variables(self.info))
         rows = slice(*pushes.indices(self.info.pushes))
-        return {name: self._group[name][rows] for name in chosen}
+        if self._is_prefix:
+            return {name: self._group[name][rows] for name in chosen}
+        assert self.rows is not None
+        picked = np.asarray(self.rows)[rows]
+        return {name: self._group[name].oindex[picked] for name in chosen}
+
+    @property
+    def _is_prefix(self) -> bool:
+        return self.rows is None or self.rows == tuple(range(len(self.rows)))
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the store as a lazy xarray dataset with dimensions and units."""
         import xarray
 
         whole = xarray.open_zarr(self.path / ARRAYS, consolidated=False, chunks=None)
-        return whole.isel(push=slice(self.info.pushes))
+        return whole if self.rows is None else whole.isel(push=list(self.rows))
 
     @property
     def content(self) -> str:
         """The hash of the content: what a trained network's card records."""
         whole = content_hash((self.path / HASHES).read_bytes())
-        if not self.is_cut:
+        if self.rows is None:
             return whole
-        return content_hash(f"{whole} {self.info.pushes}".encode())
+        chosen = len(self.rows) if self._is_prefix else self.rows
+        return content_hash(f"{whole} {chosen}".encode())
 
 
 def open_store(path: Path | str, *, verify: bool = True) -> Store:
