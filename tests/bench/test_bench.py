@@ -91,7 +91,8 @@ def driven(kind: str, augmented: bool, pushes: int, bodies: int) -> list[jax.Arr
 
 def stills(pushes: int, bodies: int) -> Still:
     each = jnp.ones((pushes, bodies))
-    return Still(each, each, each, jnp.ones(pushes))
+    nowhere = jnp.zeros((pushes, 0))
+    return Still(each, each, each, jnp.ones(pushes), nowhere, nowhere)
 
 
 def all_finite(figures: dict, *, but: tuple[str, ...] = ()) -> bool:

@@ -142,6 +142,17 @@ def body_inputs(local, motion, pose_step, step: int, i: int) -> np.ndarray:
     )
 
 
+def place_inputs(local, motion, i: int) -> np.ndarray:
+    """Where on the table a body is, how it is turned there, and the push."""
+    x, y, turn = to_table(local, motion)[i, :3]
+    angle = local.angle
+    return np.array([x, y, *unit(turn), *unit(angle)])
+
+
+def unit(angle) -> list[float]:
+    return [np.cos(angle), np.sin(angle)]
+
+
 def layers(net, x) -> np.ndarray:
     for index, (weight, bias) in enumerate(zip(net.weights, net.biases, strict=True)):
         x = x @ double(weight) + double(bias)
@@ -167,6 +178,8 @@ def accelerations(network, local, motion, simulated_step, step: int) -> np.ndarr
                 seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
                 effect += layers(network.rel, seen)
         seen = body_inputs(local, motion, pose_step, step, i)
+        if network.sizes.place:
+            seen = np.concatenate([seen, place_inputs(local, motion, i)])
         seen = bounded(seen, scales.body_mean, scales.body_deviation)
         out = layers(network.dyn, np.concatenate([seen, effect]))
         found.append(out * double(scales.acceleration))

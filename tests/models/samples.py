@@ -27,9 +27,11 @@ STEPS = 24
 
 
 @lru_cache
-def network(model: str, kind: str, seed: int = 0) -> InteractionNetwork:
+def network(
+    model: str, kind: str, seed: int = 0, *, place: bool = False
+) -> InteractionNetwork:
     """An untrained network with scales that matter and effects that are large."""
-    sizes = FeatureSizes(kind, model == "sain")
+    sizes = FeatureSizes(kind, model == "sain", place)
     rng = np.random.default_rng(seed)
 
     def drawn(low, high, size):

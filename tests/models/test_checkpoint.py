@@ -118,7 +118,8 @@ BAD_FIELDS = {
     "time_step": ["0.004", None, 0, 1, 0.0, -0.1, 2.0, True, [0.004]],
     "inner_engine": ["havok", None, ["planar"], {}],
     "weights": ["0" * 64, None],
-    "features": ["place", None],
+    "features": ["place", "everything", None],
+    "started_from": [3],
     "config": [None, []],
     "assumed": [
         [1, 2],
@@ -148,7 +149,7 @@ def test_a_card_with_a_bad_field_names_it(folder, name, value):
         json.dumps(card)
     )  # infinity too, which ours never writes
     # A card of the other network: it is the weights that then do not fit.
-    fits_not = name in ("model", "kind") and value in ("in", "direct-force")
+    fits_not = value in ("in", "direct-force", "place")
     wanted = WEIGHTS if fits_not else f"{CARD}.*{name}"
     with pytest.raises(BadCheckpoint, match=wanted) as raised:
         load_dynamics(str(folder))

@@ -8,7 +8,14 @@ import pytest
 
 from contracts.worlds import make_scene
 from models import naive
-from models.samples import PUSHES, assumed, dynamics, pushes, quick_dynamics
+from models.samples import (
+    PUSHES,
+    assumed,
+    dynamics,
+    network,
+    pushes,
+    quick_dynamics,
+)
 from sainet.models.dynamics import predict
 from sainet.models.frame import (
     controls_to_frame,
@@ -16,6 +23,7 @@ from sainet.models.frame import (
     motion_to_frame,
     push_frame,
 )
+from sainet.models.widen import widen
 from sainet.pushes import Push, path_controls
 from sainet.scene import TIME_STEP, at_rest, pack_motion
 
@@ -48,6 +56,40 @@ def test_the_network_is_the_papers_equations(model, kind, bodies):
     for push in range(PUSHES):
         wanted = naive.rollout(made.network, batch, simulated, push)
         np.testing.assert_allclose(found[push], wanted, atol=2e-5)
+
+
+@every_kind
+@every_model
+def test_a_network_that_sees_the_place_is_the_loops_too(model, kind):
+    batch = moving_pushes(kind, 2)
+    made = quick_dynamics(model, kind)
+    seeing = network(model, kind, place=True)
+    made = eqx.tree_at(lambda d: d.network, made, seeing)
+    found = np.asarray(pack_motion(predict(made, *batch).states))
+    simulated = None
+    if model == "sain":
+        rollout = eqx.filter_jit(made.engine.rollout)(*batch)
+        simulated = np.asarray(pack_motion(rollout.states), np.float64)
+    wanted = naive.rollout(seeing, batch, simulated, 1)
+    np.testing.assert_allclose(found[1], wanted, atol=2e-5)
+
+
+@every_model
+def test_a_widened_network_says_the_same_until_it_learns(model):
+    batch = moving_pushes("robot", 2)
+    made = quick_dynamics(model, "robot")
+    scales = network(model, "robot", seed=3, place=True).scales
+    wide = eqx.tree_at(lambda d: d.network, made, widen(made.network, scales))
+    assert wide.network.sizes == network(model, "robot", place=True).sizes
+    plain, found = (predict(d, *batch).states for d in (made, wide))
+    np.testing.assert_allclose(found.position, plain.position, atol=1e-7)
+    np.testing.assert_allclose(found.angle, plain.angle, atol=1e-6)
+    # The new weights count as soon as they are not zero.
+    first = lambda d: d.network.dyn.weights[0]  # noqa: E731
+    known = made.network.sizes.body
+    loud = eqx.tree_at(first, wide, first(wide).at[known : known + 6].set(1.0))
+    moved = predict(loud, *batch).states.position - plain.position
+    assert np.abs(np.asarray(moved)).max() > 1e-5
 
 
 @every_kind

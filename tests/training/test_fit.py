@@ -36,7 +36,7 @@ CONFIG = FitConfig(
     batch_size=8,
     log_every=5,
     checkpoint_every=20,
-    validation_pushes=4,
+    validation_share=1 / 6,
     learning_rate=3e-3,
 )
 
@@ -169,7 +169,7 @@ def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch
 
     monkeypatch.setattr(fit_module, "BatchReader", small)
     monkeypatch.setattr(fit_module, "make_step", never_learns(1.0))
-    fit("sain", store, replace(CONFIG, validation_pushes=0), tmp_path / "out")
+    fit("sain", store, replace(CONFIG, validation_share=0.0), tmp_path / "out")
     (used,) = readers
     assert used._cache._size <= chunk
     assert "truth_pusher" not in used.names
@@ -218,16 +218,15 @@ def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
 
 
 def test_some_pushes_have_to_remain_for_training(store, tmp_path):
-    everything = replace(CONFIG, validation_pushes=store.info.pushes)
-    with pytest.raises(BadInput, match="--validation-pushes is 24"):
-        fit("sain", store, everything, tmp_path / "out")
+    with pytest.raises(BadInput, match="--validation-share is 0.1.*only 1 push"):
+        fit("sain", store.first(1), CONFIG, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 AT_LEAST_ONE = ("iterations", "batch_size", "halve_every", "steps")
 AT_LEAST_ONE += ("log_every", "checkpoint_every")
 NOT_NEGATIVE = ("l2", "weight_position", "weight_rotation", "weight_velocity")
-NOT_NEGATIVE += ("weight_spin", "validation_pushes", "seed")
+NOT_NEGATIVE += ("weight_spin", "validation_share", "patience", "seed")
 BAD = [(name, bad) for name in AT_LEAST_ONE for bad in (0, -3)]
 BAD += [(n, bad) for n in ("learning_rate", "clip_norm") for bad in (0.0, -1.0)]
 BAD += [(name, -1) for name in NOT_NEGATIVE]

@@ -105,7 +105,7 @@ def _batch_arrays(problem: Problem) -> dict[str, Any]:
     size, whole = problem.config.batch_size, problem.batch
     if whole.simulated is None:
         raise ValueError("a batch for SAIN holds s-bar")
-    frame = push_frame(whole.scene, whole.initial)
+    frame, sizes = push_frame(whole.scene, whole.initial), problem.state.network.sizes
     initial = motion_to_frame(pack_motion(whole.initial), frame)
     simulated = path_to_frame(whole.simulated, frame).swapaxes(0, 1)
     drive = drives(controls_to_frame(whole.controls, frame), initial, simulated)
@@ -113,7 +113,7 @@ def _batch_arrays(problem: Problem) -> dict[str, Any]:
     arrays = {
         "initial": initial,
         **drive._asdict(),
-        **still_features(whole.scene, frame.pushed)._asdict(),
+        **still_features(whole.scene, frame, sizes)._asdict(),
         "pose": target.pose.swapaxes(0, 1),
         "rate": target.rate.swapaxes(0, 1),
     }

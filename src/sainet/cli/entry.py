@@ -3,9 +3,10 @@
 import logging
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
+from tyro.conf import subcommand
 
 import sainet
 from sainet.cli.bench import Bench
@@ -16,19 +17,25 @@ from sainet.cli.generate import Generate
 from sainet.cli.import_ import Import
 from sainet.cli.output import finish
 from sainet.cli.reproduce import Reproduce
-from sainet.cli.train import Train
+from sainet.cli.train import Train, fine_tuning
 from sainet.errors import SainetError
 
-_Command = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Generate, tyro.conf.subcommand("generate")]
-    | Annotated[Import, tyro.conf.subcommand("import")]
-    | Annotated[Train, tyro.conf.subcommand("train")]
-    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
-    | Annotated[Control, tyro.conf.subcommand("control")]
-    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
-)
+
+def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
+    """Return the type of all commands, with the defaults that hold for these words."""
+    tuned = any(word.partition("=")[0] == "--start-from" for word in words)
+    train = subcommand("train", default=fine_tuning()) if tuned else subcommand("train")
+    return (
+        Annotated[Demo, subcommand("demo")]
+        | Annotated[Generate, subcommand("generate")]
+        | Annotated[Import, subcommand("import")]
+        | Annotated[Train, train]
+        | Annotated[Evaluate, subcommand("evaluate")]
+        | Annotated[Control, subcommand("control")]
+        | Annotated[Reproduce, subcommand("reproduce")]
+        | Annotated[Bench, subcommand("bench")]
+    )
+
 
 _DESCRIPTION = """Simulator-augmented interaction networks: teach a physics engine what
 it gets wrong about pushed disks, and measure how much better it became.
@@ -47,7 +54,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
     try:
         command = tyro.cli(
-            _Command,  # pyright: ignore[reportArgumentType]
+            _command(words),
             args=words or ["--help"],
             prog="sainet",
             description=_DESCRIPTION,

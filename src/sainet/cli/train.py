@@ -4,12 +4,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import tyro
 from tyro.conf import Positional
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.training.config import FitConfig, ModelKind
+from sainet.training.config import FINE_TUNING, FitConfig, ModelKind
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +25,10 @@ class Train:
     """Run folder to write; the same settings go on where they stopped."""
     assumed_engine: str = "planar"
     """Engine whose stored prediction SAIN corrects, by the name in the dataset."""
+    start_from: str | None = None
+    """Network to go on from: a shipped one or the folder of a trained one. Other
+    defaults hold then, for few recorded pushes: 'sainet train --start-from sain --help'
+    shows them."""
     pushes: int | None = None
     """Pushes at the start of the dataset to train on; default: all."""
     config: FitConfig = field(default_factory=FitConfig)
@@ -55,9 +60,16 @@ class Train:
                 self.config,
                 self.out,
                 assumed_engine=self.assumed_engine,
+                start_from=self.start_from,
                 on_step=on_step,
             )
         curve = draw_history(result, self.out / "learning-curve.svg")
         self.output.say(f"{self.model.upper()} is in {self.out}, its curve in {curve}")
         loss = result.history[-1]["loss"] if result.history else None
         return {"out": str(self.out), "model": self.model, "loss": loss}
+
+
+def fine_tuning() -> Train:
+    """Return the defaults that hold when training goes on from a network."""
+    needed: Any = tyro.MISSING
+    return Train(model=needed, data=needed, out=needed, config=FINE_TUNING)

@@ -67,14 +67,12 @@ class BatchReader:
     names: tuple[str, ...]
     batch_size: int
     seed: int
-    pushes: int  # of the store's first ones, that are read
     memory: int = 1 << 30  # bytes
 
     def __post_init__(self) -> None:
         """Look up the lengths and start the thread that reads ahead."""
         self._cache = ChunkCache(self.store, self.names, self.memory)
-        steps = self.store.read(slice(0, self.pushes), ("steps",))["steps"]
-        self._steps = steps
+        self._steps = self.store.read(slice(None), ("steps",))["steps"]
         self._order = lru_cache(maxsize=2)(self._batches_of_epoch)
         self._thread = ThreadPoolExecutor(1)
         self._ahead: dict[int, object] = {}
@@ -101,12 +99,12 @@ class BatchReader:
     def _batches_of_epoch(self, epoch: int) -> list[np.ndarray]:
         """Shuffle chunks, then pushes within a few chunks; cut them into batches."""
         rng = np.random.default_rng([_ORDER_STREAM, self.seed, epoch])
-        size = self.store.info.chunk_size
-        chunks = rng.permutation(-(-self.pushes // size))
+        info = self.store.info
+        chunks = rng.permutation(info.chunks)
         batches = []
         for start in range(0, len(chunks), _WINDOW):
             window = [
-                np.arange(c * size, min((c + 1) * size, self.pushes))
+                np.arange(info.pushes)[info.chunk_slice(int(c))]
                 for c in chunks[start : start + _WINDOW]
             ]
             batches.append(rng.permutation(np.concatenate(window)))

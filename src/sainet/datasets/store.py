@@ -35,7 +35,7 @@ class Store:
             raise BadInput(f"{self.path} has {self.info.pushes} pushes, not {pushes}.")
         return self if pushes == self.info.pushes else self.take(range(pushes))
 
-    def take(self, rows: Iterable[int]) -> "Store":
+    def take(self, rows: Iterable[int] | np.ndarray) -> "Store":
         """Return the store with some of its pushes alone, in that order.
 
         Raises:

@@ -10,6 +10,8 @@ from sainet.runs import FORMAT_VERSION, read_json
 
 CARD = "card.json"
 WEIGHTS = "network.safetensors"
+# Fields that came later: what a card from before, which lacks them, means.
+_LATER = {"recurrent": True, "started_from": None}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +30,9 @@ class Card:
     config: dict[str, Any]  # of the training
     manifest: dict[str, Any]  # versions, hardware, number of devices
     final_loss: float | None = None
-    features: str = "paper"
-    recurrent: bool = True  # False: of single steps; a card that lacks it is older
+    features: str = "paper"  # or "place"
+    started_from: str | None = None  # hash of the weights that training began with
+    recurrent: bool = True  # False: of single steps
     format_version: int = field(default=FORMAT_VERSION)
 
     def to_dict(self) -> dict[str, Any]:
@@ -59,7 +62,8 @@ def read_card(folder: Path) -> Card:
             f"{FORMAT_VERSION}; upgrade sainet."
         )
     names = {f.name for f in fields(Card)}
-    found.setdefault("recurrent", True)
+    for name, before in _LATER.items():
+        found.setdefault(name, before)
     missing = sorted(names - found.keys())
     if missing:
         raise BadCheckpoint(f"{path}: {missing[0]} is missing; train it again.")

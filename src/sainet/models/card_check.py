@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sainet.errors import BadCheckpoint
-from sainet.models.features import ACTION_SIZE
+from sainet.models.features import ACTION_SIZE, FEATURES
 
 _Check = tuple[Callable[[Any], bool], str]
 
@@ -40,7 +40,7 @@ _FIELDS: dict[str, _Check] = {
         lambda v: isinstance(v, float) and 0 < v < 1,
         "in seconds, between 0 and 1",
     ),
-    "features": (lambda v: v == "paper", "'paper'"),
+    "features": (lambda v: v in FEATURES, "one of " + ", ".join(FEATURES)),
     "inner_engine": (_or_none(_is(str)), "the name of an engine or null"),
     "truth_engine": (_is(str), "the name of an engine"),
     "assumed": (_or_none(_is(dict)), "an object or null"),
@@ -49,6 +49,7 @@ _FIELDS: dict[str, _Check] = {
     "weights": (_is(str), "a hash"),
     "config": (_is(dict), "an object"),
     "manifest": (_is(dict), "an object"),
+    "started_from": (_or_none(_is(str)), "a hash or null"),
     "recurrent": (_is(bool), "true or false"),
     "final_loss": (_or_none(_is_number), "a number or null"),
 }

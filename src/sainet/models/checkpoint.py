@@ -20,7 +20,8 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
         BadCheckpoint: missing, damaged, of a newer format, or the two do not fit.
     """
     card = read_card(folder)
-    network = untrained(FeatureSizes(card.kind, card.model == "sain"), card.time_step)
+    augmented, place = card.model == "sain", card.features == "place"
+    network = untrained(FeatureSizes(card.kind, augmented, place), card.time_step)
     loaded = load_arrays(folder / WEIGHTS, network)
     if content_hash((folder / WEIGHTS).read_bytes()) != card.weights:
         raise BadCheckpoint(

@@ -190,7 +190,7 @@ def predict_motion(
         start if simulated_start is None else motion_to_frame(simulated_start, frame)
     )
     drive = drives(controls_to_frame(controls, frame), before, local)
-    return unroll(network, start, still_features(scene, frame.pushed), drive)
+    return unroll(network, start, still_features(scene, frame, network.sizes), drive)
 
 
 def _path_to_frame(motion: Array, frame: PushFrame) -> Array:

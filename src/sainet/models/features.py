@@ -16,10 +16,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from sainet.models.frame import PushFrame
 from sainet.pushes import Controls, PathControls
 from sainet.scene import Scene
 
 ACTION_SIZE = {"robot": 5, "direct-force": 4}
+FEATURES = ("paper", "place")
+_PLACE_SIZE = 6  # x, y, cos and sin of the body's and of the push frame's angle
 _PAIR_SIZE = 12  # v_i, p_i - p_j, v_i - v_j, m_i, m_j, r_i, r_j
 _BODY_SIZE = 5  # v_i, m_i, r_i
 
@@ -40,6 +43,8 @@ class Still(NamedTuple):
     radius: Float[Array, "push body"]  # m
     pushed: Float[Array, "push body"]  # 1 for the pushed disk
     pusher_radius: Float[Array, " push"]  # m
+    origin: Float[Array, "push 2"]  # m, of the push frame on the table; else empty
+    heading: Float[Array, "push 2"]  # its x axis on the table; else empty
 
 
 class FeatureSizes(eqx.Module):
@@ -47,6 +52,7 @@ class FeatureSizes(eqx.Module):
 
     kind: str = eqx.field(static=True)
     augmented: bool = eqx.field(static=True)
+    place: bool = eqx.field(static=True, default=False)  # beyond the paper
 
     @property
     def pair(self) -> int:
@@ -56,7 +62,8 @@ class FeatureSizes(eqx.Module):
     @property
     def body(self) -> int:
         """Inputs of f_dyn that are not the summed effects."""
-        return _BODY_SIZE + ACTION_SIZE[self.kind] + 3 * self.augmented
+        paper = _BODY_SIZE + ACTION_SIZE[self.kind] + 3 * self.augmented
+        return paper + _PLACE_SIZE * self.place
 
 
 def in_columns(tree: Any) -> Any:  # noqa: ANN401
@@ -118,13 +125,51 @@ def body_features(
             still.pushed[None] * action,
             still.mass[None],
             still.radius[None],
+            *_place(motion, still),
         ]
     )
 
 
-def still_features(scene: Scene, pushed: Float[Array, "*batch body"]) -> Still:
-    """Return what stays the same: the true mass and radius, never a friction."""
-    return Still(scene.mass, scene.radius, pushed, scene.pusher_radius)
+def _place(motion: Float[Array, "6 body push"], still: Still) -> list[Array]:
+    """Return where on the table each body is and how it and the push are turned.
+
+    The friction of a real table varies over it and with direction. Every symmetry of
+    the push frame is given up for that.
+    """
+    if not still.origin.shape[0]:
+        return []
+    cosine, sine = still.heading[:, None]  # [1, push]
+    x, y, turn = motion[0], motion[1], motion[2]
+    own_cosine, own_sine = jnp.cos(turn), jnp.sin(turn)
+    numbers = [
+        still.origin[0][None] + cosine * x - sine * y,
+        still.origin[1][None] + sine * x + cosine * y,
+        cosine * own_cosine - sine * own_sine,
+        sine * own_cosine + cosine * own_sine,
+        jnp.broadcast_to(cosine, x.shape),
+        jnp.broadcast_to(sine, x.shape),
+    ]
+    return [jnp.stack(numbers)]
+
+
+def still_features(scene: Scene, frame: PushFrame, sizes: FeatureSizes) -> Still:
+    """Return what stays the same: the true mass and radius, never a friction.
+
+    Args:
+        scene: of each push.
+        frame: of each push.
+        sizes: say whether the network is shown where on the table it is.
+    """
+    heading = jnp.stack([jnp.cos(frame.angle), jnp.sin(frame.angle)], axis=-1)
+    shown = slice(None) if sizes.place else slice(0)
+    return Still(
+        scene.mass,
+        scene.radius,
+        frame.pushed,
+        scene.pusher_radius,
+        frame.origin[..., shown],
+        heading[..., shown],
+    )
 
 
 def drives(

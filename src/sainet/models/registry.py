@@ -44,12 +44,7 @@ def load_dynamics(
     if name in PHYSICS:
         wrapped = PHYSICS[name](make_engine(engine or "planar"))
         return NamedDynamics(name, PhysicsDynamics(wrapped))
-    folder = PRETRAINED / name if name in SHIPPED else Path(name)
-    if not folder.exists():
-        raise UnknownName(
-            f"No model named {name!r}. Available: {', '.join(MODELS)}, or the folder "
-            "of a trained network."
-        )
+    folder = network_folder(name)
     network, card = load_network(folder)
     if engine is not None and not force:
         _check_engine(folder, card, engine)
@@ -59,6 +54,21 @@ def load_dynamics(
     if not card.recurrent:
         dynamics = Restarted(dynamics)
     return NamedDynamics(folder.name, dynamics, card, folder)
+
+
+def network_folder(name: str) -> Path:
+    """Return where the network of this name lies: shipped with the package, or a path.
+
+    Raises:
+        UnknownName: there is none.
+    """
+    folder = PRETRAINED / name if name in SHIPPED else Path(name)
+    if name in PHYSICS or not folder.exists():
+        raise UnknownName(
+            f"No model named {name!r}. Available: {', '.join(MODELS)}, or the folder "
+            "of a trained network."
+        )
+    return folder
 
 
 def _check_engine(folder: Path, card: Card, engine: str) -> None:

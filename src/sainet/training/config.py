@@ -7,6 +7,8 @@ from typing import Literal
 from sainet.errors import require_option
 
 ModelKind = Literal["in", "sain"]
+Features = Literal["paper", "place"]
+Terms = Literal["motion", "error"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,8 +43,18 @@ class FitConfig:
     """Weight of the spin."""
     clip_norm: float = 1.0
     """Greatest norm of a gradient; longer ones are shortened to it."""
-    validation_pushes: int = 0
-    """Pushes at the end of the dataset that are kept for validation."""
+    features: Features = "paper"
+    """place: the network also sees where on the table a body is and at which absolute
+    angle; the friction of a real surface varies with both."""
+    terms: Terms = "motion"
+    """What the terms of the loss are measured by: how far things move in the data, or
+    how wrong the assumed engine is about it."""
+    validation_share: float = 0.0
+    """Share of the pushes, drawn at random, that is kept for validation; the network
+    is then the one that was best on them."""
+    patience: int = 0
+    """Iterations without a better validation loss after which training ends; 0: it
+    goes on to its last iteration."""
     log_every: int = 50
     """Iterations between two lines of the log."""
     checkpoint_every: int = 250
@@ -62,8 +74,27 @@ class FitConfig:
             value = getattr(self, name)
             require_option(math.isfinite(value) and value > 0, name, "positive", value)
         weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
-        for name in ("l2", *weights, "validation_pushes", "seed"):
+        for name in ("l2", *weights, "patience", "seed"):
             value = getattr(self, name)
             require_option(
                 math.isfinite(value) and value >= 0, name, "0 or more", value
             )
+        share = self.validation_share
+        require_option(0 <= share < 1, "validation_share", "from 0 to below 1", share)
+        if self.patience:
+            require_option(
+                share > 0, "patience", "0 without --validation-share", self.patience
+            )
+
+
+# For a network that goes on from another on few recorded pushes.
+FINE_TUNING = FitConfig(
+    iterations=1_000,
+    batch_size=50,
+    halve_every=250,
+    steps=10_000,
+    terms="error",
+    validation_share=0.2,
+    patience=300,
+    log_every=25,
+)

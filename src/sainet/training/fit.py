@@ -9,14 +9,18 @@ from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import Array
 
+from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
 from sainet.engines.assumed import beliefs
 from sainet.errors import Diverged
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
+from sainet.models.checkpoint import load_network
 from sainet.models.interaction import InteractionNetwork
+from sainet.models.registry import network_folder
 from sainet.runs import (
     MANIFEST,
     RunFolder,
@@ -26,13 +30,16 @@ from sainet.runs import (
     read_json,
     write_json,
 )
+from sainet.training.best import Best
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.log import append_log, read_log, rewind_log
 from sainet.training.loss import LossWeights
 from sainet.training.step import FitState, data_loss, even_batch, make_step
-from sainet.training.task import Task, begin, check_data, settings
+from sainet.training.task import Start, Task, begin, check_data, settings
 
 STATE = "state.safetensors"
+Validate = Callable[[InteractionNetwork], float]
+Step = Callable[[FitState, PushBatch], tuple[FitState, Array]]
 _log = logging.getLogger(__name__)
 
 
@@ -51,6 +58,7 @@ def fit(
     out: Path,
     *,
     assumed_engine: str = "planar",
+    start_from: str | None = None,
     on_step: Callable[[int, float], None] = lambda iteration, loss: None,
 ) -> FitResult:
     """Train a network, or go on with an interrupted training.
@@ -61,14 +69,16 @@ def fit(
         config: of the training.
         out: the run folder.
         assumed_engine: whose stored prediction SAIN sees.
+        start_from: the network to go on from, by its name or folder; None draws one.
         on_step: told the finished iterations and the loss that was last logged.
 
     Raises:
         RunConflict: the folder holds something else.
         BadStore: the data lack what the network needs.
+        BadCheckpoint: training cannot go on from that network.
         Diverged: the loss left the finite numbers for good.
     """
-    task = Task(model, store, config, assumed_engine)
+    task = Task(model, store, config, assumed_engine, _start(start_from))
     check_data(task)
     devices = jax.device_count()
     folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
@@ -77,14 +87,25 @@ def fit(
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
     state, weights = begin(task)
+    validate = _make_validation(task, weights)
+    best = Best.first(state.network, validate(state.network)) if validate else None
     if (out / STATE).is_file():
-        state = load_arrays(out / STATE, state)
+        state, best = load_arrays(out / STATE, (state, best))
     history = rewind_log(out, int(state.iteration))
     # Where the step leaves it: otherwise its first call compiles a second time.
     state = jax.device_put(state, jax.devices()[0])
-    state = _iterate(task, state, weights, out=out, history=history, on_step=on_step)
-    _finish(task, state.network, folder, history)
+    progress = Progress(state, best, history)
+    step = make_step(config, weights)
+    _iterate(task, progress, step, validate, out=out, on_step=on_step)
+    _finish(task, progress, folder)
     return FitResult(out, history)
+
+
+def _start(name: str | None) -> Start | None:
+    if name is None:
+        return None
+    folder = network_folder(name)
+    return Start(*load_network(folder), folder)
 
 
 def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
@@ -98,37 +119,67 @@ def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
             )
 
 
+@dataclass
+class Progress:
+    """What changes while training: enough to go on from."""
+
+    state: FitState
+    best: Best | None  # where pushes are kept for validation
+    history: list[dict[str, Any]]
+
+    @property
+    def network(self) -> InteractionNetwork:
+        """The network that training would end with now."""
+        network = self.state.network
+        return network if self.best is None else self.best.put_into(network)
+
+
 def _iterate(
     task: Task,
-    state: FitState,
-    weights: LossWeights,
+    progress: Progress,
+    step: Step,
+    validate: Validate | None,
     *,
     out: Path,
-    history: list[dict[str, Any]],
     on_step: Callable[[int, float], None],
-) -> FitState:
-    config = task.config
-    step, validate = make_step(config, weights), _make_validation(task, weights)
-    reader = BatchReader(
-        task.store, task.names, config.batch_size, config.seed, task.training_pushes
-    )
+) -> None:
+    config, history = task.config, progress.history
+    reader = BatchReader(task.training, task.names, config.batch_size, config.seed)
     try:
-        for iteration in range(int(state.iteration) + 1, config.iterations + 1):
+        for iteration in range(
+            int(progress.state.iteration) + 1, config.iterations + 1
+        ):
             batch = even_batch(task.to_batch(*reader.batch(iteration - 1)))
-            state, loss = step(state, batch)
+            progress.state, loss = step(progress.state, batch)
             last = iteration == config.iterations
             if iteration % config.log_every == 0 or last:
-                line = {"iteration": iteration, "loss": float(loss)}
-                line |= validate(state.network)
-                _check_finite(line, out)
-                append_log(out, line)
-                history.append(line)
+                _log_line(progress, iteration, float(loss), validate, out)
             if iteration % config.checkpoint_every == 0 or last:
-                save_arrays(out / STATE, state)
+                save_arrays(out / STATE, (progress.state, progress.best))
             on_step(iteration, history[-1]["loss"] if history else float("nan"))
+            if progress.best and progress.best.is_stale(iteration, config.patience):
+                break
     finally:
         reader.close()
-    return state
+
+
+def _log_line(
+    progress: Progress,
+    iteration: int,
+    loss: float,
+    validate: Validate | None,
+    out: Path,
+) -> None:
+    line = {"iteration": iteration, "loss": loss}
+    if validate is not None and progress.best is not None:
+        network = progress.state.network
+        line["validation_loss"] = validate(network)
+        progress.best = progress.best.or_better(
+            network, line["validation_loss"], iteration
+        )
+    _check_finite(line, out)
+    append_log(out, line)
+    progress.history.append(line)
 
 
 def _check_finite(line: dict[str, Any], out: Path) -> None:
@@ -139,29 +190,20 @@ def _check_finite(line: dict[str, Any], out: Path) -> None:
         )
 
 
-def _make_validation(
-    task: Task, weights: LossWeights
-) -> Callable[[InteractionNetwork], dict[str, float]]:
+def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
     """Return what measures the loss on the pushes that are kept for validation."""
-    kept = task.config.validation_pushes
-    if not kept:
-        return lambda network: {}
-    part = slice(task.training_pushes, task.store.info.pushes)
-    arrays = task.store.read(part, task.names)
+    if task.validation is None:
+        return None
+    arrays = task.validation.read(slice(None), task.names)
     batch = task.to_batch(arrays, task.store.info.steps)
     known = int(batch.is_observed.sum())
     loss = jax.jit(lambda network: data_loss(network, batch, weights) / known)
-    return lambda network: {"validation_loss": float(loss(network))}
+    return lambda network: float(loss(network))
 
 
-def _finish(
-    task: Task,
-    network: InteractionNetwork,
-    folder: RunFolder,
-    history: list[dict[str, Any]],
-) -> None:
-    info, sain = task.store.info, task.model == "sain"
-    data = save_arrays(folder.path / WEIGHTS, network)
+def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
+    info, sain, history = task.store.info, task.model == "sain", progress.history
+    data = save_arrays(folder.path / WEIGHTS, progress.network)
     card = Card(
         model=task.model,
         kind=info.kind,
@@ -174,6 +216,8 @@ def _finish(
         weights=content_hash(data),
         config=asdict(task.config),
         manifest=read_json(folder.path / MANIFEST),
+        features=task.config.features,
+        started_from=task.start.card.weights if task.start else None,
         recurrent=task.config.recurrent,
         final_loss=history[-1]["loss"] if history else None,
     )

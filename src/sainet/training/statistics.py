@@ -37,7 +37,7 @@ def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
         simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
     drive = drives(controls_to_frame(batch.controls, frame), start, simulated)
     drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    still = in_columns(still_features(batch.scene, frame.pushed))
+    still = in_columns(still_features(batch.scene, frame, sizes))
     columns = jax.vmap(in_columns)((before, drive))
     over_time = jax.vmap(lambda now: body_features(now[0], still, now[1]), out_axes=1)
     body_mean, body_deviation = _spread(over_time(columns))
@@ -67,21 +67,46 @@ def _spread(features: Array) -> tuple[Array, Array]:
 
 @eqx.filter_jit
 def loss_weights(batch: PushBatch, config: FitConfig) -> LossWeights:
-    """Return the settings over the mean squares of the motion in the data."""
-    motion = _known_motion(batch)
-    moved = motion[..., 0:3] - pack_motion(batch.initial)[:, None, :, 0:3]
-    place = jnp.mean(jnp.sum(moved[..., 0:2] ** 2, axis=-1))
-    velocity = jnp.mean(jnp.sum(motion[..., 3:5] ** 2, axis=-1))
+    """Return the settings over mean squares in the data.
+
+    Those of the motion, or of the errors that s-bar makes where the truth was observed:
+    errors are what training is to make small, and where one end of a push alone is
+    known, position and rotation would else count very unequally.
+    """
+    pose, rate = _motion(batch) if config.terms == "motion" else _errors(batch)
+    place = jnp.nanmean(jnp.sum(pose[..., 0:2] ** 2, axis=-1))
+    velocity = jnp.nanmean(jnp.sum(rate[..., 0:2] ** 2, axis=-1))
     return LossWeights(
         position=config.weight_position / _nonzero(place),
-        rotation=config.weight_rotation / _nonzero(jnp.mean(moved[..., 2] ** 2)),
+        rotation=config.weight_rotation / _nonzero(jnp.nanmean(pose[..., 2] ** 2)),
         velocity=config.weight_velocity / _nonzero(velocity),
-        spin=config.weight_spin / _nonzero(jnp.mean(motion[..., 5] ** 2)),
+        spin=config.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
+    )
+
+
+def _motion(batch: PushBatch) -> tuple[Array, Array]:
+    """Return how far things have moved and how fast they do."""
+    motion = _known_motion(batch)
+    start = pack_motion(batch.initial)[:, None]
+    return motion[..., 0:3] - start[..., 0:3], motion[..., 3:6]
+
+
+def _errors(batch: PushBatch) -> tuple[Array, Array]:
+    """Return how wrong s-bar is, NaN where the truth was not observed."""
+    assert batch.simulated is not None
+    error = batch.truth - batch.simulated
+
+    def where(observed: Array, part: Array) -> Array:
+        return jnp.where(observed[:, :, None, None], part, jnp.nan)
+
+    return (
+        where(batch.pose_observed, error[..., 0:3]),
+        where(batch.rate_observed, error[..., 3:6]),
     )
 
 
 def _nonzero(square: Array) -> Array:
-    """Return a mean square, or 1 where nothing moves: a disk that never turns, say."""
+    """Return a mean square, or 1 where there is none: of a disk that never turns."""
     return jnp.where(square > _STILL, square, 1.0)
 
 

@@ -1,0 +1,180 @@
+"""Going on from a trained network: on few pushes, known at their ends alone."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+from sainet.datasets.batch import to_batch
+from sainet.errors import BadCheckpoint, BadInput, UnknownName
+from sainet.models.card import read_card
+from sainet.models.checkpoint import load_network
+from sainet.training import fit as fit_module
+from sainet.training.best import Best
+from sainet.training.config import FINE_TUNING, FitConfig
+from sainet.training.fit import fit
+from sainet.training.statistics import loss_weights
+from sainet.training.task import Start, Task, begin
+from training.stores import end_points_alone, info_of, made_up, write
+
+BEFORE = FitConfig(iterations=3, batch_size=4, steps=12, log_every=1)
+TUNING = replace(
+    FINE_TUNING, iterations=8, batch_size=4, log_every=1, checkpoint_every=2, patience=0
+)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    info = info_of(20, engine="recorded", seed=None)
+    arrays = end_points_alone(made_up(info))
+    return write(tmp_path_factory.mktemp("recorded") / "data", info, arrays)
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("start")
+    info = info_of(20)
+    simulated = write(folder / "data", info, made_up(info, seed=1))
+    for model in ("in", "sain"):
+        fit(model, simulated, BEFORE, folder / model)
+    return folder
+
+
+def layers(folder):
+    return jax.tree.leaves(load_network(folder)[0])
+
+
+def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
+    out = tmp_path / "out"
+    fit("sain", store, TUNING, out, start_from=str(start / "sain"))
+    card, before = read_card(out), read_card(start / "sain")
+    assert card.started_from == before.weights
+    assert (card.truth_engine, card.features) == ("recorded", "paper")
+    task = Task("sain", store, TUNING, "planar", load(start / "sain"))
+    first = begin(task)[0].network
+    for found, known in zip(
+        jax.tree.leaves(first), layers(start / "sain"), strict=True
+    ):
+        np.testing.assert_array_equal(found, known)
+    changed = [
+        np.abs(a - b).max()
+        for a, b in zip(layers(out), layers(start / "sain"), strict=True)
+    ]
+    assert max(changed) < 0.1  # from there, not from anywhere
+
+
+def load(folder):
+    return Start(*load_network(folder), folder)
+
+
+def test_a_network_learns_to_see_the_place(store, start, tmp_path):
+    out = tmp_path / "out"
+    seeing = replace(TUNING, features="place", validation_share=0.0)
+    fit("in", store, seeing, out, start_from=str(start / "in"))
+    network, card = load_network(out)
+    assert card.features == "place"
+    assert network.sizes.place
+    known = load_network(start / "in")[0].sizes.body
+    assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
+    with pytest.raises(BadCheckpoint, match="give --features place, too"):
+        fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
+
+
+def test_the_best_network_on_the_validation_pushes_is_kept(
+    store, start, tmp_path, monkeypatch
+):
+    told = iter([0.9, 0.8, 0.3, 0.5, 0.4, 0.6, 0.7, 0.7, 0.7])
+    kept = []
+
+    def validation(task, weights):
+        def validate(network):
+            kept.append(network)
+            return next(told)
+
+        return validate
+
+    monkeypatch.setattr(fit_module, "_make_validation", validation)
+    patient = replace(TUNING, patience=4)
+    result = fit("in", store, patient, tmp_path / "out", start_from=str(start / "in"))
+    # The first figure is of the start, the third, of iteration 2, is the best.
+    assert [line["iteration"] for line in result.history] == [1, 2, 3, 4, 5, 6]
+    for found, wanted in zip(
+        layers(tmp_path / "out"), jax.tree.leaves(kept[2]), strict=True
+    ):
+        np.testing.assert_array_equal(found, wanted)
+
+
+class Stopped(Exception):
+    pass
+
+
+def test_an_interrupted_tuning_ends_in_the_same_network(store, start, tmp_path):
+    patient = replace(TUNING, patience=6)
+    words = {"start_from": str(start / "sain")}
+    fit("sain", store, patient, tmp_path / "whole", **words)
+
+    def stop(iteration, loss):
+        if iteration == 3:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        fit("sain", store, patient, tmp_path / "cut", on_step=stop, **words)
+    fit("sain", store, patient, tmp_path / "cut", **words)
+    for name in ("network.safetensors", "log.jsonl"):
+        whole, cut = ((tmp_path / run / name).read_bytes() for run in ("whole", "cut"))
+        assert whole == cut
+
+
+def test_validation_pushes_are_drawn_at_random_and_not_trained_on(store):
+    task = Task("in", store, TUNING, "planar")
+    training, validation = set(task.training.rows), set(task.validation.rows)
+    assert (len(training), len(validation)) == (16, 4)
+    assert training | validation == set(range(20))
+    other = Task("in", store, replace(TUNING, seed=1), "planar")
+    assert set(other.validation.rows) != validation
+    assert validation != set(range(16, 20))
+
+
+def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):
+    batch = to_batch(store.read(slice(None)), store.info, simulated="planar")
+    found = loss_weights(batch, TUNING)
+    last = np.asarray(batch.truth - batch.simulated, np.float64)[:, -1]
+    place = np.mean(np.sum(last[..., :2] ** 2, axis=-1))
+    np.testing.assert_allclose(found.position, 1 / place, rtol=1e-4)
+    np.testing.assert_allclose(found.rotation, 1 / np.mean(last[..., 2] ** 2), 1e-4)
+    # No velocity was observed: there is nothing to measure it by.
+    assert (float(found.velocity), float(found.spin)) == (1.0, 1.0)
+
+
+def test_what_cannot_be_gone_on_from_is_refused(store, start, tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(BadCheckpoint, match="model is 'in', this training's is 'sain'"):
+        fit("sain", store, TUNING, out, start_from=str(start / "in"))
+    for name in ("nowhere", "physics"):
+        with pytest.raises(UnknownName, match=f"No model named '{name}'"):
+            fit("in", store, TUNING, out, start_from=name)
+    assert not out.exists()
+
+
+def test_a_network_around_another_engine_is_refused(store, tmp_path):
+    with pytest.raises(BadCheckpoint, match="inner_engine is 'bullet'"):
+        fit("sain", store, TUNING, tmp_path / "out", start_from="sain-bullet")
+
+
+def test_patience_needs_pushes_to_validate_on():
+    with pytest.raises(BadInput, match="--patience is 5"):
+        FitConfig(patience=5)
+    for share in (1.0, 1.5, float("nan")):
+        with pytest.raises(BadInput, match="--validation-share"):
+            FitConfig(validation_share=share)
+
+
+def test_equal_is_not_better(start):
+    network = load_network(start / "in")[0]
+    best = Best.first(network, 0.5)
+    assert best.or_better(network, 0.5, 7) is best
+    assert best.or_better(network, float("nan"), 7) is best
+    assert int(best.or_better(network, 0.4, 7).iteration) == 7
+    assert [best.is_stale(i, 3) for i in (2, 3)] == [False, True]
+    assert not best.is_stale(10_000, 0)
