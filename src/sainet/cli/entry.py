@@ -14,6 +14,7 @@ from sainet.cli.control import Control
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
 from sainet.cli.generate import Generate
+from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
 from sainet.cli.output import finish
 from sainet.cli.reproduce import Reproduce
@@ -31,6 +32,7 @@ def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
         | Annotated[Import, subcommand("import")]
         | Annotated[Train, train]
         | Annotated[Evaluate, subcommand("evaluate")]
+        | Annotated[Identify, subcommand("identify")]
         | Annotated[Control, subcommand("control")]
         | Annotated[Reproduce, subcommand("reproduce")]
         | Annotated[Bench, subcommand("bench")]

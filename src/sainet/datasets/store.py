@@ -54,6 +54,18 @@ class Store:
         info = replace(self.info, pushes=len(chosen))
         return replace(self, info=info, rows=chosen)
 
+    def of_group(self, name: str) -> "Store":
+        """Return the pushes of one group.
+
+        Raises:
+            BadInput: there is no such group.
+        """
+        if name not in self.info.groups:
+            known = ", ".join(self.info.groups) or "none"
+            raise BadInput(f"{self.path} has no group {name!r}; it has {known}.")
+        groups = self.read(slice(None), ("group",))["group"]
+        return self.take(np.flatnonzero(groups == self.info.groups.index(name)))
+
     @cached_property
     def _group(self) -> Any:  # noqa: ANN401
         import zarr

@@ -28,18 +28,17 @@ class AssumedProperties(AbstractEngine):
     mass: tuple[float, ...] | None = eqx.field(static=True, default=PAPER_MASS)
     radius: tuple[float, ...] | None = eqx.field(static=True, default=PAPER_RADIUS)
     friction: float | None = eqx.field(static=True, default=PAPER_FRICTION)
+    pusher_friction: float | None = eqx.field(static=True, default=None)
+    disk_friction: float | None = eqx.field(static=True, default=None)
 
     def assume(self, scene: Scene) -> Scene:
         """Return the scene as this engine believes it to be; None keeps the truth."""
-        table = scene.table_friction
         return Scene(
             mass=_replace(scene.mass, self.mass),
             radius=_replace(scene.radius, self.radius),
-            table_friction=table
-            if self.friction is None
-            else jnp.full_like(table, self.friction),
-            disk_friction=scene.disk_friction,
-            pusher_friction=scene.pusher_friction,
+            table_friction=_fill(scene.table_friction, self.friction),
+            disk_friction=_fill(scene.disk_friction, self.disk_friction),
+            pusher_friction=_fill(scene.pusher_friction, self.pusher_friction),
             pusher_radius=scene.pusher_radius,
             time_step=scene.time_step,
         )
@@ -67,6 +66,10 @@ def beliefs(name: str) -> dict[str, Any]:
 def calibrated(engine: AbstractEngine) -> AssumedProperties:
     """Wrap an engine that knows the true masses and radii, but not the friction."""
     return AssumedProperties(engine, **beliefs(CALIBRATED))
+
+
+def _fill(true: Array, assumed: float | None) -> Array:
+    return true if assumed is None else jnp.full_like(true, assumed)
 
 
 def _replace(

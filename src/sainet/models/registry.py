@@ -4,6 +4,8 @@ from pathlib import Path
 
 from sainet.engines import ASSUMED_ENGINES, CALIBRATED, make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
+from sainet.engines.identified import FILE as IDENTIFIED
+from sainet.engines.identified import read_identified
 from sainet.errors import BadCheckpoint, UnknownName
 from sainet.models.card import CARD, Card
 from sainet.models.checkpoint import load_network
@@ -29,8 +31,8 @@ def load_dynamics(
 
     Args:
         name: `physics`, `physics-calibrated`, a shipped network (`in`, `sain`,
-            `sain-bullet`), or the folder of a trained one (`./sain`, say, where a
-            shipped one has its name).
+            `sain-bullet`), or a folder: of a trained network (`./sain`, say, where a
+            shipped one has its name), or of an engine's identified parameters.
         engine: inside the model; None is planar for physics, and for a network the
             one that it was trained around.
         force: put a network around another engine all the same.
@@ -45,6 +47,8 @@ def load_dynamics(
         wrapped = PHYSICS[name](make_engine(engine or "planar"))
         return NamedDynamics(name, PhysicsDynamics(wrapped))
     folder = network_folder(name)
+    if (folder / IDENTIFIED).is_file():
+        return NamedDynamics(folder.name, PhysicsDynamics(read_identified(folder)))
     network, card = load_network(folder)
     if engine is not None and not force:
         _check_engine(folder, card, engine)

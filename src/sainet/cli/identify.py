@@ -1,0 +1,39 @@
+"""`sainet identify`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sainet.cli.devices import use_devices
+from sainet.cli.output import Output
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identify:
+    """Fit the planar engine's own parameters to observed pushes."""
+
+    data: Path
+    """Dataset of pushes along paths, observed at their ends at least."""
+    out: Path
+    """Run folder to write; a model wherever one is expected."""
+    group: str | None = None
+    """Take the pushes of this group alone, abs-10 say; default: all."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Identify the parameters and say what the data cannot tell."""
+        use_devices(None)
+        from sainet.datasets.store import open_store
+        from sainet.identification.identify import identify_into
+        from sainet.viz.estimates import print_estimates
+
+        store = open_store(self.data)
+        store = store if self.group is None else store.of_group(self.group)
+        self.output.say(f"Fitting to {store.info.pushes} pushes, a minute or so.")
+        found = identify_into(store, self.out)
+        print_estimates(found, self.output.console)
+        self.output.say(
+            f"Compare: sainet evaluate --model physics-calibrated {self.out} "
+            f"--data {self.data}"
+        )
+        return {"out": str(self.out), **found}

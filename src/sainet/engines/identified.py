@@ -1,0 +1,51 @@
+"""An engine whose own parameters were identified from observed pushes."""
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from sainet.engines.assumed import AssumedProperties
+from sainet.engines.planar.engine import PlanarEngine
+from sainet.errors import BadInput
+from sainet.runs import read_json
+
+FILE = "identified.json"
+FRICTIONS = ("pusher_friction", "disk_friction", "table_friction")
+RATIO = "pressure_radius_ratio"
+NAMES = (*FRICTIONS, RATIO)
+USUAL_RATIO = 2 / 3  # of a pressure that is uniform
+
+
+def identified_engine(values: Mapping[str, float]) -> AssumedProperties:
+    """Return an engine with identified values, and the scene's where there is none.
+
+    Masses and radii are the scene's own.
+    """
+    return AssumedProperties(
+        PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO)),
+        mass=None,
+        radius=None,
+        friction=values.get("table_friction"),
+        pusher_friction=values.get("pusher_friction"),
+        disk_friction=values.get("disk_friction"),
+    )
+
+
+def read_identified(folder: Path) -> AssumedProperties:
+    """Return the engine that `sainet identify` left in a folder.
+
+    Raises:
+        BadInput: the file is damaged or holds no such values.
+    """
+    path = folder / FILE
+    values = read_json(path).get("values")
+    if not isinstance(values, dict) or not values:
+        raise BadInput(f"{path}: values is missing; run 'sainet identify' again.")
+    for name, value in values.items():
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if name not in NAMES or not (number and math.isfinite(value) and value > 0):
+            raise BadInput(
+                f"{path}: values.{name} is {value!r}; it must be a positive number "
+                f"for one of {', '.join(NAMES)}. Run 'sainet identify' again."
+            )
+    return identified_engine(values)

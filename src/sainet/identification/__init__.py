@@ -1,0 +1,1 @@
+"""Fitting an engine's own parameters to pushes that were observed."""

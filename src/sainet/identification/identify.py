@@ -1,0 +1,238 @@
+"""Fit the planar engine's parameters to observed pushes, by gradient through it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import least_squares
+
+from sainet.datasets.store import Store
+from sainet.engines.identified import FILE
+from sainet.errors import BadStore
+from sainet.identification.parameters import (
+    BOUNDS,
+    Estimate,
+    names_for,
+    starting_values,
+)
+from sainet.identification.residuals import (
+    Sample,
+    Scale,
+    pose_errors,
+    residuals,
+    samples,
+    slopes,
+)
+from sainet.runs import open_run, read_json, write_json
+
+_RESAMPLES = 2_000
+_INTERVAL = (2.5, 97.5)  # percent
+_BOOTSTRAP = 0x1DE47
+_VAGUE = 3.0  # ratio of the ends of an interval, from which a value is not told
+_AT_BOUND = 1.01  # ratio to it
+_INSIDE = 1e-3  # of a bound, where a search begins (log of the value)
+_RIDGE = 1e-6  # of the largest slope: what the data say nothing of stays where it was
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What was found, and how much better the engine is for it."""
+
+    estimates: tuple[Estimate, ...]
+    pushes: int
+    before_mm: float  # mean position error where the pushes were observed
+    after_mm: float
+    before_deg: float
+    after_deg: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON values; `values` is what an engine is made of."""
+        values = {estimate.name: estimate.value for estimate in self.estimates}
+        return {"values": values, **asdict(self)}
+
+
+def identify_into(store: Store, out: Path) -> dict[str, Any]:
+    """Identify an engine's parameters into a run folder; again is no work.
+
+    Returns:
+        What `Identified.to_dict` says, as it is kept in `identified.json`.
+
+    Raises:
+        RunConflict: the folder holds something else.
+        BadStore: see `identify`.
+    """
+    settings = {"command": "identify", "data": store.content}
+    check_store(store)
+    folder = open_run(out, settings, finished_by=FILE)
+    if not folder.is_finished:
+        write_json(out / FILE, identify(store).to_dict())
+    return read_json(out / FILE)
+
+
+def check_store(store: Store) -> None:
+    """Raise `BadStore` if no parameter can be identified from such pushes."""
+    if store.info.kind != "robot":
+        raise BadStore(
+            f"{store.path}: kind is {store.info.kind!r}; parameters are identified "
+            "from pushes along paths: give pushes of the robot setup."
+        )
+
+
+def identify(store: Store) -> Identified:
+    """Fit contact friction, table friction and pressure distribution.
+
+    Nonlinear least squares (SciPy, robust against outliers) on position and rotation at
+    the observed steps, each measured by how wrong the engine is at the start. The 95 %
+    intervals are of a bootstrap over pushes, each resample one Gauss-Newton step away.
+    What the data cannot tell stays as the scenes have it, and the rest is fitted again.
+
+    Args:
+        store: of pushes along paths, observed at their ends at least.
+
+    Raises:
+        BadStore: nothing of its pushes was observed, or forces drive them.
+    """
+    check_store(store)
+    parts = samples(store)
+    if not parts:
+        raise BadStore(f"{store.path}: no pose was observed; there is nothing to fit.")
+    scene = parts[0].batch.scene
+    start = starting_values(scene, names_for(scene))
+    before, scale = _mean_errors(start, parts), _scale(start, parts)
+    values, known, doubtful = start, {}, {}
+    while len(doubtful) < len(start):
+        free = [name for name in start if name not in doubtful]
+        values = _solve(start, free, scale, parts)
+        known = _intervals(values, free, scale, parts)
+        doubts = {name: _doubt(name, values[name], *known[name]) for name in free}
+        new = {n: (doubt, known[n]) for n, doubt in doubts.items() if doubt}
+        if not new:
+            break
+        doubtful, values = doubtful | new, start
+    after = _mean_errors(values, parts)
+    return Identified(
+        estimates=tuple(
+            _estimate(name, values[name], start[name], known, doubtful)
+            for name in start
+        ),
+        pushes=sum(len(part.steps) for part in parts),
+        before_mm=before[0],
+        after_mm=after[0],
+        before_deg=before[1],
+        after_deg=after[1],
+    )
+
+
+def _solve(
+    start: Mapping[str, float],
+    free: Sequence[str],
+    scale: Scale,
+    parts: Sequence[Sample],
+) -> dict[str, float]:
+    """Return the best values of the free parameters, the others as they were."""
+    bounds = np.log([BOUNDS[name] for name in free]).T
+    first = np.log([start[name] for name in free])
+
+    def logs(vector: np.ndarray) -> dict[str, float]:
+        given = dict(zip(free, vector.tolist(), strict=True))
+        return {name: given.get(name, float(np.log(v))) for name, v in start.items()}
+
+    def residual(vector: np.ndarray) -> np.ndarray:
+        found = [residuals(logs(vector), scale, part).ravel() for part in parts]
+        return np.concatenate(found)
+
+    def slope(vector: np.ndarray) -> np.ndarray:
+        found = [slopes(logs(vector), free, scale, part) for part in parts]
+        return np.concatenate([part.reshape(-1, len(free)) for part in found])
+
+    solution = least_squares(
+        residual,
+        np.clip(first, bounds[0] + _INSIDE, bounds[1] - _INSIDE),
+        slope,  # pyright: ignore[reportArgumentType]
+        bounds=bounds,
+        loss="soft_l1",
+        x_scale="jac",
+    )
+    return {name: float(np.exp(value)) for name, value in logs(solution.x).items()}
+
+
+def _intervals(
+    values: Mapping[str, float],
+    free: Sequence[str],
+    scale: Scale,
+    parts: Sequence[Sample],
+) -> dict[str, tuple[float, float]]:
+    """Return the 95 % interval of each free parameter, over pushes like these."""
+    logs = {name: float(np.log(value)) for name, value in values.items()}
+    matrices, vectors = [], []
+    for part in parts:
+        error, slope = residuals(logs, scale, part), slopes(logs, free, scale, part)
+        weight = 1 / np.sqrt(1 + error**2)  # of the soft l1 loss
+        matrices.append(np.einsum("pn,pni,pnj->pij", weight, slope, slope))
+        vectors.append(np.einsum("pn,pni,pn->pi", weight, slope, error))
+    steps = _resampled_steps(np.concatenate(matrices), np.concatenate(vectors))
+    found = {}
+    for index, name in enumerate(free):
+        draws = np.clip(logs[name] - steps[:, index], *np.log(BOUNDS[name]))
+        low, high = np.exp(np.percentile(draws, _INTERVAL))
+        found[name] = (float(low), float(high))
+    return found
+
+
+def _resampled_steps(
+    matrix: Float[np.ndarray, "push p p"], vector: Float[np.ndarray, "push p"]
+) -> Float[np.ndarray, "resample p"]:
+    """Return the Gauss-Newton step from the solution on each resample of the pushes."""
+    pushes, size = vector.shape
+    rng = np.random.default_rng(_BOOTSTRAP)
+    counts = rng.multinomial(pushes, np.full(pushes, 1 / pushes), _RESAMPLES)
+    ridge = _RIDGE * np.trace(matrix.sum(axis=0)) * np.eye(size)
+    left = np.einsum("rp,pij->rij", counts, matrix) + ridge
+    right = np.einsum("rp,pi->ri", counts, vector)
+    return np.linalg.solve(left, right[..., None])[..., 0]
+
+
+def _estimate(
+    name: str,
+    value: float,
+    start: float,
+    known: Mapping[str, tuple[float, float]],
+    doubtful: Mapping[str, tuple[str, tuple[float, float]]],
+) -> Estimate:
+    doubt, interval = doubtful.get(name, (None, known.get(name, BOUNDS[name])))
+    return Estimate(name, value, *interval, start, doubt)
+
+
+def _doubt(name: str, value: float, low: float, high: float) -> str | None:
+    """Say why the data cannot tell a parameter, if they cannot."""
+    least, most = BOUNDS[name]
+    if value < least * _AT_BOUND or value > most / _AT_BOUND:
+        return f"it is at the end of what is looked at, {least:g} to {most:g}"
+    if high > _VAGUE * low:
+        return f"anything from {low:.2g} to {high:.2g} does as well"
+    return None
+
+
+def _raw_errors(values: Mapping[str, float], part: Sample) -> np.ndarray:
+    tree = {name: jnp.float32(value) for name, value in values.items()}
+    return np.asarray(pose_errors(tree, part.batch, jnp.asarray(part.steps)))
+
+
+def _scale(values: Mapping[str, float], parts: Sequence[Sample]) -> Scale:
+    errors = np.concatenate([_raw_errors(values, p).reshape(-1, 3) for p in parts])
+    place = np.sqrt(np.mean(np.sum(errors[:, :2] ** 2, axis=-1)))
+    turn = np.sqrt(np.mean(errors[:, 2] ** 2))
+    return Scale(float(place) or 1.0, float(turn) or 1.0)
+
+
+def _mean_errors(
+    values: Mapping[str, float], parts: Sequence[Sample]
+) -> tuple[float, float]:
+    """Return mean errors (mm, degrees) over pushes, where they were observed."""
+    errors = np.concatenate([_raw_errors(values, part) for part in parts])
+    place = np.linalg.norm(errors[..., :2], axis=-1)
+    return 1000 * float(place.mean()), float(np.rad2deg(np.abs(errors[..., 2]).mean()))

@@ -1,0 +1,119 @@
+"""How far an engine's predictions are from what was observed, and how that changes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.store import Store
+from sainet.identification.parameters import with_values
+
+_LOOKS = 8  # observed poses of a push that are compared, evenly over it
+_BATCH = 256  # pushes at a time
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Pushes of one length, and at which steps they are looked at."""
+
+    batch: PushBatch
+    steps: Int[np.ndarray, "push look"]  # of observed poses, the last one repeated
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What errors are divided by: those of the starting values, root mean square."""
+
+    position: float  # m
+    rotation: float  # rad
+
+
+def samples(store: Store) -> list[Sample]:
+    """Return the observed pushes of a store, some of one length at a time."""
+    lengths = store.read(slice(None), ("steps",))["steps"]
+    found = []
+    for length in np.unique(lengths):
+        same = np.flatnonzero(lengths == length)
+        for start in range(0, len(same), _BATCH):
+            part = store.take(same[start : start + _BATCH])
+            batch = to_batch(part.read(slice(None)), part.info, steps=int(length))
+            seen = np.asarray(batch.pose_observed).any(axis=1)
+            if seen.any():
+                batch = jax.tree.map(lambda x, seen=seen: x[seen], batch)
+                found.append(Sample(batch, _looks(np.asarray(batch.pose_observed))))
+    return found
+
+
+def _looks(observed: np.ndarray) -> Int[np.ndarray, "push look"]:
+    """Return up to so many observed steps of each push, the last one always."""
+    count = min(_LOOKS, int(observed.sum(axis=1).max()))
+    rows = []
+    for push in observed:
+        known = np.flatnonzero(push)
+        share = np.arange(1, count + 1) / count
+        rows.append(known[np.ceil(share * len(known)).astype(int) - 1])
+    return np.array(rows)
+
+
+@eqx.filter_jit
+def pose_errors(
+    values: Mapping[str, Float[Array, ""]],
+    batch: PushBatch,
+    steps: Int[Array, "push look"],
+) -> Float[Array, "push look body 3"]:
+    """Return predicted minus observed poses (m, m, rad); differentiable in values."""
+    scene, engine = with_values(batch.scene, values)
+    states = engine.rollout(scene, batch.initial, batch.controls).states
+    pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+    looks = steps[:, :, None, None]
+    return jnp.take_along_axis(pose - batch.measured, looks, axis=1)
+
+
+@eqx.filter_jit
+def _residual(
+    free: dict, fixed: dict, sizes: Array, batch: PushBatch, steps: Array
+) -> Array:
+    values = {name: jnp.exp(value) for name, value in (free | fixed).items()}
+    error = pose_errors(values, batch, steps)
+    scaled = error / jnp.broadcast_to(sizes, error.shape)
+    # A push counts once, however often it was looked at.
+    return scaled.reshape(len(scaled), -1) / jnp.sqrt(1.0 * steps.shape[1])
+
+
+_slope = eqx.filter_jit(jax.jacfwd(_residual))
+
+
+def residuals(
+    log_values: Mapping[str, float], scale: Scale, sample: Sample
+) -> Float[np.ndarray, "push number"]:
+    """Return the scaled errors of each push."""
+    found = _residual(*_arguments(log_values, (), scale, sample))
+    return np.asarray(found, np.float64)
+
+
+def slopes(
+    log_values: Mapping[str, float],
+    free: Sequence[str],
+    scale: Scale,
+    sample: Sample,
+) -> Float[np.ndarray, "push number parameter"]:
+    """Return derivatives by the free parameters, forward through the engine."""
+    found = _slope(*_arguments(log_values, free, scale, sample))
+    return np.stack([np.asarray(found[name], np.float64) for name in free], axis=-1)
+
+
+def _arguments(
+    log_values: Mapping[str, float],
+    free: Sequence[str],
+    scale: Scale,
+    sample: Sample,
+) -> tuple[dict, dict, Array, PushBatch, Array]:
+    tree = {name: jnp.float32(value) for name, value in log_values.items()}
+    chosen = {name: tree.pop(name) for name in free}
+    sizes = jnp.array([scale.position, scale.position, scale.rotation], jnp.float32)
+    return chosen, tree, sizes, sample.batch, jnp.asarray(sample.steps)

@@ -1,0 +1,172 @@
+"""Identification finds what the engine was given, and says what it cannot find."""
+
+import json
+from dataclasses import replace
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate
+from sainet.datasets.store import open_store
+from sainet.datasets.writer import write_store
+from sainet.engines.identified import FILE, identified_engine, read_identified
+from sainet.engines.planar.engine import PlanarEngine
+from sainet.errors import BadInput, BadStore, RunConflict
+from sainet.identification.identify import identify, identify_into
+from sainet.identification.parameters import names_for, with_values
+from sainet.identification.residuals import Scale, residuals, samples, slopes
+from sainet.models.registry import load_dynamics
+from training.stores import end_points_alone, info_of, made_up, write
+
+TRUE = {"pusher_friction": 0.17, "pressure_radius_ratio": 0.5}
+STROKES = GenerateConfig(
+    disks=1,
+    pushes=24,
+    chunk_size=24,
+    stroke_mm=(10.0,),
+    speed_mm_s=(10.0,),  # so slowly that inertia, and with it the table, is not felt
+    direction_deg=50.0,
+    hold_steps=4,
+    noise_level="none",
+)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    """Ends of strokes in a world with the true values; the store believes in others."""
+    folder = tmp_path_factory.mktemp("identify")
+    made = generate(STROKES, folder / "made")
+    arrays, info = made.read(slice(None)), made.info
+    friction = np.full(info.pushes, 0.25, np.float32)
+    arrays |= {"pusher_friction": friction, "disk_friction": friction}
+    arrays |= {"table_friction": np.full(info.pushes, 0.15, np.float32)}
+    scene, engine = with_values(
+        to_scene(arrays, info), {k: jnp.float32(v) for k, v in TRUE.items()}
+    )
+    rollout = eqx.filter_jit(engine.rollout)
+    motion, _ = from_trajectory(
+        rollout(scene, to_initial(arrays), to_controls(arrays, info))
+    )
+    noise = np.random.default_rng(0).normal(size=(*motion.shape[:3], 3))
+    motion = motion.copy()
+    motion[..., :3] += noise * [1e-4, 1e-4, 2e-3]
+    arrays |= {"truth": motion, "measured": motion[..., :3]}
+    seen = end_points_alone(arrays)
+    seen["measured"] = np.where(
+        seen["pose_observed"][..., None, None], motion[..., :3], np.nan
+    )
+    info = replace(info, engine="recorded")
+    (folder / "data").mkdir()
+    write_store(folder / "data", info, seen)
+    return open_store(folder / "data")
+
+
+@pytest.fixture(scope="module")
+def found(store):
+    return identify(store)
+
+
+def test_the_values_of_the_world_are_found_within_their_intervals(found):
+    for estimate in found.estimates:
+        if estimate.name in TRUE:
+            true = TRUE[estimate.name]
+            assert estimate.doubt is None
+            assert estimate.value == pytest.approx(true, rel=0.05)
+            assert estimate.low < true < estimate.high
+            assert estimate.high < 1.3 * estimate.low
+    assert found.pushes == 24
+    assert found.after_mm < 0.5 * found.before_mm
+    assert found.after_deg < 0.7 * found.before_deg
+
+
+def test_what_the_data_cannot_tell_is_said_and_stays(found):
+    (table,) = [e for e in found.estimates if e.name == "table_friction"]
+    # A pushed disk goes the same way on any table, as long as it does not coast.
+    assert table.doubt is not None
+    assert table.value == table.start == pytest.approx(0.15)
+
+
+def test_one_disk_touches_no_other(store):
+    scene = samples(store)[0].batch.scene
+    assert "disk_friction" not in names_for(scene)
+
+
+def test_slopes_are_those_of_finite_differences(store):
+    part, scale = samples(store)[0], Scale(1e-3, 1e-2)
+    logs = {name: float(np.log(value)) for name, value in TRUE.items()}
+    slope = slopes(logs, list(logs), scale, part)
+    for index, name in enumerate(logs):
+        sides = [
+            residuals(logs | {name: logs[name] + step}, scale, part)
+            for step in (-0.01, 0.01)
+        ]
+        numeric = (sides[1] - sides[0]) / 0.02
+        close = np.abs(numeric - slope[..., index]) < 0.05 * np.abs(numeric).max()
+        assert close.mean() > 0.9  # contact has kinks
+
+
+def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
+    out = tmp_path / "mine"
+    result = identify_into(store, out)
+    assert json.loads((out / FILE).read_text()) == result
+    model = load_dynamics(str(out))
+    assert model.name == "mine"
+    engine = model.dynamics.engine
+    assert engine.pusher_friction == result["values"]["pusher_friction"]
+    assert isinstance(engine.engine, PlanarEngine)
+    before = (out / FILE).stat().st_mtime_ns
+    assert identify_into(store, out) == result
+    assert (out / FILE).stat().st_mtime_ns == before
+    with pytest.raises(RunConflict, match="data is"):
+        identify_into(store.first(5), out)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{}", "values is missing"),
+        ('{"values": {"pusher_friction": -1}}', "values.pusher_friction is -1"),
+        ('{"values": {"grip": 0.3}}', "values.grip"),
+        ('{"values": {"pusher_friction": true}}', "pusher_friction is True"),
+        ("{", "cannot be read as JSON"),
+    ],
+)
+def test_a_damaged_file_is_named(tmp_path, text, says):
+    (tmp_path / FILE).write_text(text)
+    with pytest.raises(BadInput, match=says):
+        read_identified(tmp_path)
+
+
+def test_what_is_not_identified_is_the_scenes():
+    engine = identified_engine({"pusher_friction": 0.3})
+    scene = with_values(samples_scene(), {})[0]
+    believed = engine.assume(scene)
+    np.testing.assert_allclose(believed.pusher_friction, 0.3)
+    for name in ("mass", "radius", "table_friction", "disk_friction"):
+        np.testing.assert_array_equal(getattr(believed, name), getattr(scene, name))
+
+
+def samples_scene():
+    info = info_of(3)
+    return to_scene(made_up(info), info)
+
+
+def test_pushes_that_nothing_can_be_learned_from_are_refused(tmp_path):
+    info = info_of(3)
+    arrays = made_up(info)
+    blind = arrays | {"pose_observed": 0 * arrays["pose_observed"]}
+    with pytest.raises(BadStore, match="no pose was observed"):
+        identify(write(tmp_path / "blind", info, blind))
+
+
+def test_a_group_that_is_not_there_lists_those_that_are(tmp_path):
+    info = info_of(4, groups=("abs", "wood"))
+    arrays = made_up(info) | {"group": np.array([0, 1, 1, 0])}
+    store = write(tmp_path / "data", info, arrays)
+    assert store.of_group("wood").rows == (1, 2)
+    with pytest.raises(BadInput, match="no group 'ice'; it has abs, wood"):
+        store.of_group("ice")
