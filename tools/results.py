@@ -1,9 +1,9 @@
 """Run the commands whose figures stand in docs/results.md, and write them there.
 
-    python tools/results.py [--recorded FOLDER] [--skip SECTION ...]
+    python tools/results.py [SECTION ...] [--recorded FOLDER]
 
 Each section is a command, its figures and the machine; none is typed by hand. Finished
-runs are not made again, so that a second call measures the benchmarks alone.
+runs are not made again. Sections that are not named stay as they stand in the page.
 """
 
 import argparse
@@ -17,32 +17,36 @@ from pathlib import Path
 from typing import Any
 
 from sainet.runs import manifest
+from sainet.training.config import FitConfig
 from sainet.viz.tables import to_markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 SAINET = str(Path(sys.executable).with_name("sainet"))
 RUNS = Path("runs/results")
-SECTIONS = ("robot", "recorded", "parity", "bench", "speed")
+_LEVEL = 0.02  # two scores closer than this are level
+PAGE = ROOT / "docs" / "results.md"
 
 
 def main() -> None:
-    """Measure everything and write the page."""
+    """Measure what is asked for and write it into the page."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], default=[])
     parser.add_argument("--recorded", type=Path, default=_recorded_folder())
-    parser.add_argument("--skip", nargs="*", default=[], choices=SECTIONS)
     options = parser.parse_args()
-    parts = [_head()]
-    if "robot" not in options.skip:
-        parts.append(_robot())
-    if "recorded" not in options.skip:
-        parts.append(_recorded(options.recorded))
-    if "parity" not in options.skip:
-        parts.append(_parity())
-    if "bench" not in options.skip:
-        parts.append(_bench())
-    if "speed" not in options.skip:
-        parts.append(_speed())
-    (ROOT / "docs" / "results.md").write_text("\n".join(parts), "utf-8")
+    os.environ["SAINET_RECORDED"] = str(options.recorded)
+    parts = _standing()
+    for name in options.sections or SECTIONS:
+        title, write = SECTIONS[name]
+        parts[title] = f"## {title}\n\n{write().strip()}\n"
+        ordered = [parts[title] for title, _ in SECTIONS.values() if title in parts]
+        PAGE.write_text("\n".join([_head(), *ordered]), "utf-8")
+
+
+def _standing() -> dict[str, str]:
+    """Return the sections of the page as it stands, by title."""
+    text = PAGE.read_text("utf-8") if PAGE.is_file() else ""
+    sections = ["## " + part.strip() + "\n" for part in text.split("\n## ")[1:]]
+    return {section.split("\n")[0].removeprefix("## "): section for section in sections}
 
 
 def _recorded_folder() -> Path:
@@ -75,7 +79,6 @@ def _head() -> str:
 def _robot() -> str:
     words = ("reproduce", "robot-planar", "--scale", "paper", "--out", str(RUNS))
     return (
-        "## Robot setup, planar truth with noise, planar assumed engine\n\n"
         f"`sainet {' '.join(words)}`: 4,500 pushes, 10,000 iterations, 500 test "
         "pushes, three trainings of each network (intervals are over pushes and "
         "trainings). Published rows are the paper's Table III, whose truth is Bullet "
@@ -95,15 +98,18 @@ def _trainings(folder: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _recorded(folder: Path) -> str:
+def _imported() -> Path:
     data = RUNS / "recorded"
-    file = folder / "ellip1_endpoints.csv"
+    file = Path(os.environ["SAINET_RECORDED"]) / "ellip1_endpoints.csv"
     _run("import", "mitpush-endpoints", str(file), "--out", str(data))
-    stroke = _stroke()
+    return data
+
+
+def _recorded() -> str:
+    data, stroke = _imported(), _stroke()
     words = ("evaluate", "--model", "physics", str(stroke), "--data", str(data))
     table = to_markdown(_run(*words))
     return (
-        "## Recorded pushes (real), planar engine\n\n"
         "`sainet import mitpush-endpoints ellip1_endpoints.csv --out "
         f"{data}`; then `sainet generate {' '.join(STROKES)}` and `sainet train "
         f"{' '.join(STROKE_TRAINING)}`, a network that has seen simulated pushes of "
@@ -113,6 +119,69 @@ def _recorded(folder: Path) -> str:
         f"The same network on simulated strokes of 10 mm/s (seed 5):\n\n"
         f"{to_markdown(_simulated_strokes(stroke))}"
     )
+
+
+def _identified() -> str:
+    data = _imported()
+    lines = [
+        "| pushes | pusher friction | pressure radius ratio | not told | position (mm) "
+        "| rotation (deg) |",
+        "| :-- | --: | --: | :-- | --: | --: |",
+    ]
+    for group in (None, "abs-10", "abs-20", "plywood-10"):
+        out = RUNS / f"identified-{group or 'all'}"
+        words = () if group is None else ("--group", group)
+        found = _run("identify", "--data", str(data), *words, "--out", str(out))
+        lines.append(_identified_row(group or "all", found))
+    return (
+        f"`sainet identify --data {data} [--group GROUP] --out DIR`: contact friction "
+        "(0.25 before), table friction and pressure distribution (0.667, uniform, "
+        "before) of the planar engine, fitted to where the disk ended; 95 % intervals "
+        "over pushes. Errors are mean final errors before and after, on the same "
+        "pushes that were fitted: no test of anything new.\n\n" + "\n".join(lines)
+    )
+
+
+def _identified_row(group: str, found: dict[str, Any]) -> str:
+    known = {estimate["name"]: estimate for estimate in found["estimates"]}
+    cells = [
+        "{value:.3f} [{low:.3f}, {high:.3f}]".format(**known[name])
+        for name in ("pusher_friction", "pressure_radius_ratio")
+    ]
+    doubts = [name.replace("_", " ") for name, e in known.items() if e["doubt"]]
+    errors = [
+        f"{found[f'before_{unit}']:.2f} to {found[f'after_{unit}']:.2f}"
+        for unit in ("mm", "deg")
+    ]
+    row = [f"{group} ({found['pushes']})", *cells, ", ".join(doubts), *errors]
+    return f"| {' | '.join(row)} |"
+
+
+def _regularisation() -> str:
+    words = ("reproduce", "regularisation", "--scale", "paper", "--out", str(RUNS))
+    found = _run(*words)
+    scores = [f"| {c['l2']:g} | {c['score']:.4f} |" for c in found["choices"]]
+    least = min(found["choices"], key=lambda choice: choice["score"])
+    return (
+        f"`sainet {' '.join(words)}`: IN and SAIN on 4,500 pushes of the robot setup "
+        "(Bullet), one training each, compared on 500 validation pushes that are "
+        "neither trained nor tested on. The score is the mean error over that of "
+        "physics.\n\n| l2 | score |\n| --: | --: |\n" + "\n".join(scores) + "\n\n"
+        f"The least is at {least['l2']:g}. "
+        f"{_choice(found['choices'])}\n\n{to_markdown(found)}"
+    )
+
+
+def _choice(choices: list[dict[str, float]]) -> str:
+    usual = next(c for c in choices if c["l2"] == FitConfig.l2)
+    least = min(choice["score"] for choice in choices)
+    above = usual["score"] / least - 1
+    if above == 0:
+        return "It is the default."
+    said = f"The default, {FitConfig.l2:g}, is {above:.1%} above it"
+    if above >= _LEVEL:
+        return f"{said}."
+    return f"{said} and stays: with one training each, that is no difference to act on."
 
 
 # One disk, strokes as long and as oblique as the recorded ones.
@@ -141,7 +210,6 @@ def _simulated_strokes(network: Path) -> dict[str, Any]:
 def _parity() -> str:
     words = ("reproduce", "engine-parity", "--out", str(RUNS))
     return (
-        "## Planar against Bullet\n\n"
         f"`sainet {' '.join(words)}`: 200 random pushes of each setup, truth Bullet "
         "without noise, every engine with the true properties. `planar-0.67` has the "
         "default pressure ratio; `bullet-at-45-deg` is Bullet in a scene that was "
@@ -152,13 +220,13 @@ def _parity() -> str:
 
 def _bench() -> str:
     lines = []
-    for case in ("training", "engines"):
+    for case in ("training", "engines", "planning"):
         figures = _run("bench", case)
         lines.append(f"`sainet bench {case} --json`\n")
         lines.append("| figure | value |\n| :-- | --: |")
         lines += [f"| `{k}` | {_short(v)} |" for k, v in figures.items()]
         lines.append("")
-    return "## Benchmarks\n\n" + "\n".join(lines)
+    return "\n".join(lines)
 
 
 def _short(value: object) -> str:
@@ -177,7 +245,7 @@ def _speed() -> str:
     shutil.rmtree(out, ignore_errors=True)
     lines = [f"| {name} | {value:.2f} | {runs} |" for name, value, runs in rows]
     head = "| command | seconds (median) | runs |\n| :-- | --: | --: |"
-    return "## Whole commands\n\n" + "\n".join([head, *lines]) + "\n"
+    return "\n".join([head, *lines])
 
 
 def _several(runs: int, *command: str) -> tuple[float, int]:
@@ -187,6 +255,16 @@ def _several(runs: int, *command: str) -> tuple[float, int]:
 def _median(times: list[float]) -> tuple[float, int]:
     return sorted(times)[len(times) // 2], len(times)
 
+
+SECTIONS = {
+    "robot": ("Robot setup, planar truth with noise, planar assumed engine", _robot),
+    "regularisation": ("The choice of l2", _regularisation),
+    "recorded": ("Recorded pushes (real), planar engine", _recorded),
+    "identified": ("Recorded pushes (real), engine identified", _identified),
+    "parity": ("Planar against Bullet", _parity),
+    "bench": ("Benchmarks", _bench),
+    "speed": ("Whole commands", _speed),
+}
 
 if __name__ == "__main__":
     main()
