@@ -9,6 +9,7 @@ from typing import Any
 
 from sainet.datasets.mitpush_arrays import ASSUMED_ENGINE, store_info, to_arrays
 from sainet.datasets.mitpush_log import EndpointLog, find_log, read_bytes, read_log
+from sainet.datasets.mitpush_names import DISK, NO_DISKS
 from sainet.datasets.recorded import (
     CONTACT_FRICTION,
     TABLE_FRICTION,
@@ -20,11 +21,6 @@ from sainet.datasets.writer import write_store
 from sainet.errors import BadTable
 from sainet.runs import content_hash
 
-DISK = "ellip1"
-NO_DISKS = (
-    *("ellip2", "ellip3", "rect1", "rect2", "rect3", "tri1", "tri2", "tri3"),
-    *("hex", "butter"),
-)
 CONTACT_FRICTION_ORIGIN = (
     "default: mu in a published evaluation log of this robot (plywood, rect1), and the "
     "choice of an earlier sweep on these same pushes, so that it is no blind guess; "
