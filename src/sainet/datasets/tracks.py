@@ -36,7 +36,7 @@ class Track:
         before = after - 1
         early, late = time - self.time[before], self.time[after] - time
         within = (early >= -_SAME_TIME) & (late >= -_SAME_TIME)
-        beside = np.minimum(np.abs(early), np.abs(late)) <= TIME_STEP
+        beside = np.minimum(np.abs(early), np.abs(late)) <= TIME_STEP + _SAME_TIME
         return within & (beside | (early + late <= LONGEST_GAP))
 
     def since(self, start: float) -> "Track":
