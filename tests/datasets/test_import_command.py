@@ -30,7 +30,7 @@ def test_physics_is_evaluated_on_what_was_imported(
     assert json.loads(capfd.readouterr().out.splitlines()[-1])["pushes"] == 1
     models = ["physics", "physics-calibrated"]
     words = ["evaluate", "--model", *models, "--data", out, "--json", "--quiet"]
-    assert run(words) == 0
+    assert run([*words, "--devices", "2"]) == 0
     found = json.loads(capfd.readouterr().out.splitlines()[-1])["rows"]
     assert {row["model"] for row in found} == set(models)
     assert all(row["n"] == 1 and 0 < row["pos_mm"] < 100 for row in found)

@@ -156,6 +156,7 @@ HOSTILE = {
     ),
     "cut row": (to_csv(rows())[:-30], "row 203: has .* fields, not 8"),
     "no number": (change(9, "y", "left"), "row 9: y is 'left', which is no number"),
+    "underscore": (change(9, "x", "0_2"), "row 9: x is '0_2', which is no number"),
     "empty field": (change(9, "y", ""), "row 9: y is '', which is no number"),
     "nan": (change(10, "x", "nan"), "row 10: x is nan; it must be finite"),
     "infinite": (change(10, "time", "1e999"), "row 10: time is inf"),
@@ -232,6 +233,7 @@ BAD_PROPERTIES = {
         PROPERTIES.replace("1.0", "-1.0"),
         "mass is -1.0; it must",
     ),
+    "huge": (PROPERTIES.replace("1.0", "9" * 400), "mass is 9+; it must be positive"),
     "text": (PROPERTIES.replace("1.0", "'1'"), "mass is '1'; it must be positive"),
     "truth": (PROPERTIES.replace("1.0", "true"), "mass is True; it must be positive"),
     "nan": (PROPERTIES.replace("0.05", "nan"), "radius is nan; it must be positive"),
@@ -297,10 +299,11 @@ def test_parquet_gives_the_same_as_csv(tmp_path: Path):
     table = [[*row, "wood"] for row in rows("7") + rows("3")]
     one = import_table(*write(tmp_path, to_csv(table, GROUPED)), tmp_path / "one")
     numbered = [[int(row[0]), *row[1:]] for row in table]
-    path, bodies = as_parquet(tmp_path, to_parquet(numbered, GROUPED))
-    other = import_table(path, bodies, tmp_path / "other").read(slice(None))
-    for name, value in one.read(slice(None)).items():
-        np.testing.assert_array_equal(other[name], value, err_msg=name)
+    for form, written in {"text": table, "numbers": numbered}.items():
+        path, bodies = as_parquet(tmp_path, to_parquet(written, GROUPED))
+        other = import_table(path, bodies, tmp_path / form).read(slice(None))
+        for name, value in one.read(slice(None)).items():
+            np.testing.assert_array_equal(other[name], value, err_msg=name)
 
 
 def without(column: int, row: int = 4) -> list[list]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
+from sainet.cli.devices import use_cache
 from sainet.cli.output import Output
 from sainet.errors import BadInput
 
@@ -36,6 +37,7 @@ class Import:
 
     def run(self) -> dict[str, Any]:
         """Import the pushes."""
+        use_cache()
         store = self._import()
         self.output.say(f"{store.info.pushes} pushes are in {self.out}")
         groups = list(store.info.groups)

@@ -100,11 +100,21 @@ def _only(path: Path, where: str, content: dict[str, Any], known: set[str]) -> N
 def _positive(path: Path, where: str, content: dict[str, Any], name: str) -> float:
     if name not in content:
         raise BadTable(f"{path}: {where} has no {name}; write {EXAMPLE}.")
-    value = content[name]
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 0 < value < float("inf"):
-        raise BadTable(f"{path}: {where} {name} is {value!r}; it must be positive.")
-    return float(value)
+    value = _number(content[name])
+    if not 0 < value < float("inf"):
+        found = f"{content[name]!r}"[:40]
+        raise BadTable(f"{path}: {where} {name} is {found}; it must be positive.")
+    return value
+
+
+def _number(value: object) -> float:
+    """Return a number, NaN for what is none or too large for one."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return float("nan")
+    try:
+        return float(value)
+    except OverflowError:
+        return float("nan")
 
 
 def _mass(path: Path, where: str, content: dict[str, Any]) -> float:
@@ -128,10 +138,10 @@ def _radius(path: Path, where: str, content: dict[str, Any]) -> float:
 
 
 def _friction(path: Path, content: dict[str, Any], name: str, default: float) -> float:
-    value = content.get(name, default)
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not 0 <= value < float("inf"):
+    value = _number(content.get(name, default))
+    if not 0 <= value < float("inf"):
+        found = f"{content[name]!r}"[:40]
         raise BadTable(
-            f"{path}: [friction] {name} is {value!r}; it must be zero or positive."
+            f"{path}: [friction] {name} is {found}; it must be zero or positive."
         )
-    return float(value)
+    return value

@@ -56,7 +56,10 @@ def _load(path: Path, data: bytes) -> Any:  # noqa: ANN401
         check_header(path, file.schema_arrow.names)
         if file.metadata.num_rows > MOST_ROWS:
             raise BadTable(f"{path}: has over {MOST_ROWS} rows; split it by pushes.")
-        return file.read()
+        # They stay codes: a small file may hold any number of copies of a long text.
+        fields = [field for field in file.schema_arrow if field.name not in NUMBERS]
+        texts = [field.name for field in fields if str(field.type).endswith("string")]
+        return parquet.read_table(io.BytesIO(data), read_dictionary=texts)
     except BadTable:
         raise
     except Exception as error:
@@ -87,16 +90,20 @@ def _codes(path: Path, name: str, column: Any) -> tuple[np.ndarray, list[str]]: 
     import pyarrow as pa  # pyright: ignore[reportMissingImports]
 
     try:
-        texts = column.cast(pa.string()).combine_chunks().dictionary_encode()
+        if not pa.types.is_dictionary(column.type):
+            column = column.cast(pa.string()).dictionary_encode()
+        column = column.unify_dictionaries().combine_chunks()
+        texts = column.dictionary.cast(pa.string()).to_pylist()
     except pa.ArrowException:
         raise BadTable(
             f"{path}: column {name} holds {column.type}, not text; convert it."
         ) from None
-    names = [text.strip() for text in texts.dictionary.to_pylist()]
-    codes = texts.indices.fill_null(-1).to_numpy(zero_copy_only=False)
+    names = [(text or "").strip() for text in texts]
+    codes = column.indices.fill_null(-1).to_numpy(zero_copy_only=False)
     empty = np.flatnonzero((codes < 0) | ~np.array([*map(bool, names), False])[codes])
     if len(empty):
         raise BadTable(f"{path}: row {empty[0] + 1}: {name} is empty; name it.")
-    unique = list(dict.fromkeys(names))
-    order = np.array([unique.index(text) for text in names])
-    return order[codes].astype(np.int64), unique
+    used, first = np.unique(codes, return_index=True)
+    order = dict.fromkeys(names[code] for code in used[np.argsort(first)])
+    place = {text: index for index, text in enumerate(order)}
+    return np.array([place.get(text, -1) for text in names])[codes], list(order)

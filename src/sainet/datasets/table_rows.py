@@ -151,7 +151,8 @@ def _text(path: Path, line: int, name: str, text: str) -> str:
 
 def _number(path: Path, line: int, name: str, text: str) -> float:
     try:
-        value = float(text)
+        # Python reads 1_000 as a number; nobody who writes tables means that.
+        value = float(text.replace("_", "?"))
     except ValueError:
         raise BadTable(
             f"{path}: row {line}: {name} is {text[:40]!r}, which is no number; "
