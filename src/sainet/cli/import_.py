@@ -23,16 +23,17 @@ class Import:
     mitpush: the raw MIT Push dataset, all along each push of its disk.
     table: your own pushes, one row for each push, time and body."""
     path: Annotated[Positional[Path], arg(metavar="PATH")]
-    """mitpush-endpoints: the CSV, the folder that holds it, or a .mat log of the
-    authors. mitpush: a zip, a folder tree of zips, or a folder of .h5 or .json files.
+    """mitpush-endpoints: the CSV, its folder, or a .mat log of the authors.
+    mitpush: a zip, a folder tree of zips, or a folder of .h5 or .json.
     table: a .csv or .parquet file."""
     out: Path
     """Run folder to write."""
     properties: Path | None = None
     """Masses, radii and frictions as TOML (table alone needs it)."""
     contact_friction: float | None = None
-    """Friction between pusher and disk; None takes what the properties of a table say,
-    else 0.25, which is from a sweep on pushes of the MIT Push dataset."""
+    """Friction between pusher and disk, and between disks.
+    None takes what the properties of a table say, else 0.25,
+    which is from a sweep on pushes of the MIT Push dataset."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:
