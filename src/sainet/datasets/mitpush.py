@@ -4,37 +4,29 @@ The disk `ellip1` is the one that the paper's robot pushes. Its state is known b
 and after each push; in between nothing was observed, and the store says so.
 """
 
-import logging
-import os
-import shutil
-import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from sainet.datasets.mitpush_arrays import ASSUMED_ENGINE, store_info, to_arrays
 from sainet.datasets.mitpush_log import EndpointLog, find_log, read_bytes, read_log
-from sainet.datasets.store import Store, open_store
-from sainet.datasets.writer import HASHES, write_store
-from sainet.errors import BadInput, BadTable
-from sainet.runs import CONFIG, content_hash, open_run, write_error
-
-_log = logging.getLogger(__name__)
-
-DISK = "ellip1"
-NO_DISKS = (
-    *("ellip2", "ellip3", "rect1", "rect2", "rect3", "tri1", "tri2", "tri3"),
-    *("hex", "butter"),
+from sainet.datasets.mitpush_names import DISK, NO_DISKS
+from sainet.datasets.recorded import (
+    CONTACT_FRICTION,
+    TABLE_FRICTION,
+    check_frictions,
+    make_once,
 )
-CONTACT_FRICTION = 0.25
+from sainet.datasets.store import Store
+from sainet.datasets.writer import write_store
+from sainet.errors import BadTable
+from sainet.runs import content_hash
+
 CONTACT_FRICTION_ORIGIN = (
     "default: mu in a published evaluation log of this robot (plywood, rect1), and the "
     "choice of an earlier sweep on these same pushes, so that it is no blind guess; "
     "swept from 0.15 to 0.35, the planar engine's positions are best from 0.15 to 0.2 "
     "and its rotations on abs at 0.35"
 )
-TABLE_FRICTION = 0.15  # the paper's; a quasi-static path hardly depends on it
 
 
 def import_endpoints(
@@ -64,20 +56,19 @@ def import_endpoints(
         RunConflict: the folder holds something else; nothing was touched.
         BadInput: a friction is negative or no number, or the disk is full.
     """
-    _check_friction("contact-friction", contact_friction)
-    _check_friction("table-friction", table_friction)
-    file, out = find_log(Path(path)), Path(out)
+    check_frictions(contact_friction, table_friction)
+    file = find_log(Path(path))
     data = read_bytes(file)
     log = read_log(file, data)
     _check_shapes(log)
     config = _config(file.name, data, contact_friction, table_friction)
-    if not _is_finished(out, config):
-        with _whole_or_nothing(out) as folder:
-            open_run(folder, config, finished_by=HASHES)
-            info = store_info(log)
-            arrays = to_arrays(log, info, contact_friction, table_friction)
-            write_store(folder, info, arrays)
-    return open_store(out)
+
+    def write(folder: Path) -> None:
+        info = store_info(log)
+        arrays = to_arrays(log, info, contact_friction, table_friction)
+        write_store(folder, info, arrays)
+
+    return make_once(Path(out), config, write)
 
 
 def _config(
@@ -97,11 +88,6 @@ def _config(
     }
 
 
-def _check_friction(name: str, value: float) -> None:
-    if not 0 <= value < float("inf"):
-        raise BadInput(f"--{name} is {value}; it must be zero or positive.")
-
-
 def _check_shapes(log: EndpointLog) -> None:
     for place, shape in zip(log.places, log.shape, strict=True):
         if shape in NO_DISKS:
@@ -113,33 +99,3 @@ def _check_shapes(log: EndpointLog) -> None:
                 f"{log.path}: {place}: shape is {shape!r}: {reason}. "
                 f"Give pushes of {DISK} alone."
             )
-
-
-def _is_finished(out: Path, config: dict[str, Any]) -> bool:
-    """Whether the folder holds this very store; a folder of other things is refused."""
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
-        return False
-    finished = open_run(out, config, finished_by=HASHES).is_finished
-    if finished:
-        _log.info("%s is finished already", out)
-    return finished
-
-
-@contextmanager
-def _whole_or_nothing(out: Path) -> Iterator[Path]:
-    """Give a folder beside `out` that takes its place if all went well."""
-    place = out.resolve()
-    folder = place.with_name(f".{place.name}.{uuid.uuid4().hex}.partial")
-    try:
-        yield folder
-        # Only of a damaged store of the same settings: all of it was made again.
-        if (place / CONFIG).is_file():
-            shutil.rmtree(place)
-        os.replace(folder, place)
-    except OSError as error:
-        raise write_error(out, error) from error
-    except BadInput as error:
-        # The user knows nothing of the folder beside.
-        raise BadInput(str(error).replace(str(folder), str(out))) from error
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)

@@ -3,13 +3,9 @@
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
 from sainet.datasets.mitpush_log import EndpointLog
+from sainet.datasets.recorded import simulate
 from sainet.datasets.schema import StoreInfo, published_name, simulated_name
-from sainet.engines import make_engine
-from sainet.engines.assumed import AssumedProperties
-from sainet.engines.base import roll_out
-from sainet.errors import Diverged
 from sainet.scene import TIME_STEP
 
 MASS = 0.8937  # kg
@@ -77,7 +73,9 @@ def to_arrays(
         k: v.astype(np.float32) if v.dtype == float else v for k, v in arrays.items()
     }
     arrays["truth_pusher"] = arrays["command_position"]
-    return arrays | {simulated_name(ASSUMED_ENGINE): _simulate(arrays, info)}
+    return arrays | {
+        simulated_name(ASSUMED_ENGINE): simulate(ASSUMED_ENGINE, arrays, info)
+    }
 
 
 def _ends(log: EndpointLog, info: StoreInfo) -> dict[str, np.ndarray]:
@@ -117,17 +115,3 @@ def _path(log: EndpointLog, info: StoreInfo) -> dict[str, np.ndarray]:
         "command_position": log.tip_before[:, None] + travelled * way,
         "command_velocity": (step <= steps) * way / (steps * info.time_step),
     }
-
-
-def _simulate(
-    arrays: dict[str, np.ndarray], info: StoreInfo
-) -> Float[np.ndarray, "push time body 6"]:
-    """Return s-bar: what the engine predicts with the paper's assumed properties."""
-    engine = AssumedProperties(make_engine(ASSUMED_ENGINE))
-    scene, initial = to_scene(arrays, info), to_initial(arrays)
-    trajectory = roll_out(engine, scene, initial, to_controls(arrays, info))
-    motion, _ = from_trajectory(trajectory)
-    if not np.isfinite(motion).all():
-        push = int(np.argmin(np.isfinite(motion).all((1, 2, 3))))
-        raise Diverged(f"{ASSUMED_ENGINE} left the numbers in push {push}.")
-    return motion

@@ -1,0 +1,147 @@
+"""What somebody's own disks are: a TOML file of masses and radii."""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sainet.datasets.mitpush_log import read_bytes
+from sainet.datasets.recorded import (
+    CONTACT_FRICTION,
+    TABLE_FRICTION,
+    check_frictions,
+)
+from sainet.errors import BadTable
+
+EXAMPLE = "[bodies.NAME] with mass = 0.9 and radius = 0.05, and [pusher] radius = 0.005"
+_LARGEST_RADIUS = 1.0  # m
+_LARGEST_MASS = 100.0  # kg
+_SECTIONS = {"bodies", "pusher", "friction"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyProperties:
+    """The disks in their order, the pusher, and the frictions."""
+
+    names: tuple[str, ...]
+    mass: tuple[float, ...]  # kg
+    radius: tuple[float, ...]  # m
+    pusher_radius: float  # m
+    table_friction: float
+    contact_friction: float
+
+
+def read_properties(
+    path: Path, contact_friction: float | None = None
+) -> BodyProperties:
+    """Read what the disks are.
+
+    Args:
+        path: a TOML file with `[bodies.NAME] mass, radius`, `[pusher] radius` and maybe
+            `[friction] table, contact`.
+        contact_friction: in the place of what the file says.
+
+    Raises:
+        BadTable: with the file, the field and the way out.
+        BadInput: a friction is negative or no number.
+    """
+    content = _load(path)
+    _only(path, "the file", content, _SECTIONS)
+    bodies = _section(path, content, "bodies")
+    friction = _section(path, content, "friction") if "friction" in content else {}
+    _only(path, "[friction]", friction, {"table", "contact"})
+    pusher = _section(path, content, "pusher")
+    _only(path, "[pusher]", pusher, {"radius"})
+    for name in bodies:
+        _only(path, _body(name), _section(path, bodies, name), {"mass", "radius"})
+    names = tuple(bodies)
+    table = _friction(path, friction, "table", TABLE_FRICTION)
+    contact = _friction(path, friction, "contact", CONTACT_FRICTION)
+    found = BodyProperties(
+        names=names,
+        mass=tuple(_mass(path, _body(name), bodies[name]) for name in names),
+        radius=tuple(_radius(path, _body(name), bodies[name]) for name in names),
+        pusher_radius=_radius(path, "[pusher]", pusher),
+        table_friction=table,
+        contact_friction=contact if contact_friction is None else contact_friction,
+    )
+    check_frictions(found.contact_friction, found.table_friction)
+    return found
+
+
+def _load(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(read_bytes(path).decode())
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise BadTable(f"{path}: is no TOML ({reason}); write {EXAMPLE}.") from None
+
+
+def _body(name: str) -> str:
+    return f"[bodies.{name[:40]!r}]"
+
+
+def _section(path: Path, content: dict[str, Any], name: str) -> dict[str, Any]:
+    found = content.get(name)
+    if not isinstance(found, dict) or not found:
+        raise BadTable(f"{path}: {name[:40]!r} is missing or empty; write {EXAMPLE}.")
+    return found
+
+
+def _only(path: Path, where: str, content: dict[str, Any], known: set[str]) -> None:
+    for name in content:
+        if name not in known:
+            raise BadTable(
+                f"{path}: {where} has an unknown field {name[:40]!r}; it may have "
+                f"{', '.join(sorted(known))}."
+            )
+
+
+def _positive(path: Path, where: str, content: dict[str, Any], name: str) -> float:
+    if name not in content:
+        raise BadTable(f"{path}: {where} has no {name}; write {EXAMPLE}.")
+    value = _number(content[name])
+    if not 0 < value < float("inf"):
+        found = f"{content[name]!r}"[:40]
+        raise BadTable(f"{path}: {where} {name} is {found}; it must be positive.")
+    return value
+
+
+def _number(value: object) -> float:
+    """Return a number, NaN for what is none or too large for one."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return float("nan")
+    try:
+        return float(value)
+    except OverflowError:
+        return float("nan")
+
+
+def _mass(path: Path, where: str, content: dict[str, Any]) -> float:
+    value = _positive(path, where, content, "mass")
+    if value > _LARGEST_MASS:
+        raise BadTable(
+            f"{path}: {where} mass is {value:g}: looks like grams; masses are in "
+            "kilograms."
+        )
+    return value
+
+
+def _radius(path: Path, where: str, content: dict[str, Any]) -> float:
+    value = _positive(path, where, content, "radius")
+    if value > _LARGEST_RADIUS:
+        raise BadTable(
+            f"{path}: {where} radius is {value:g}: looks like millimetres; radii are "
+            "in metres."
+        )
+    return value
+
+
+def _friction(path: Path, content: dict[str, Any], name: str, default: float) -> float:
+    value = _number(content.get(name, default))
+    if not 0 <= value < float("inf"):
+        found = f"{content[name]!r}"[:40]
+        raise BadTable(
+            f"{path}: [friction] {name} is {found}; it must be zero or positive."
+        )
+    return value

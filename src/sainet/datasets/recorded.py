@@ -1,0 +1,114 @@
+"""What importers of recorded pushes share: frictions, s-bar, a folder made whole."""
+
+import logging
+import os
+import shutil
+import uuid
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
+from sainet.datasets.schema import StoreInfo
+from sainet.datasets.store import Store, open_store
+from sainet.datasets.writer import HASHES
+from sainet.engines import make_assumed_engine
+from sainet.engines.base import roll_out
+from sainet.errors import BadInput, Diverged
+from sainet.runs import CONFIG, open_run, write_error
+
+_log = logging.getLogger(__name__)
+
+CONTACT_FRICTION = 0.25
+TABLE_FRICTION = 0.15  # the paper's; a quasi-static path hardly depends on it
+
+
+def check_frictions(contact_friction: float, table_friction: float) -> None:
+    """Check what the user says of friction.
+
+    Raises:
+        BadInput: one is negative or no number.
+    """
+    for name, value in {"contact": contact_friction, "table": table_friction}.items():
+        if not 0 <= value < float("inf"):
+            raise BadInput(
+                f"--{name}-friction is {value}; it must be zero or positive."
+            )
+
+
+def make_once(
+    out: Path, config: dict[str, Any], write: Callable[[Path], None]
+) -> Store:
+    """Make a store of recorded pushes, unless it is there already.
+
+    Args:
+        out: the run folder; it appears when the store is whole and not before.
+        config: what decides the store, as JSON values.
+        write: fills the folder that it is given with the store.
+
+    Raises:
+        RunConflict: the folder holds something else; nothing was touched.
+        BadInput: the disk is full.
+    """
+    if not _is_finished(out, config):
+        with _whole_or_nothing(out) as folder:
+            open_run(folder, config, finished_by=HASHES)
+            write(folder)
+    return open_store(out)
+
+
+def simulate(
+    name: str, arrays: dict[str, np.ndarray], info: StoreInfo
+) -> Float[np.ndarray, "push time body 6"]:
+    """Return s-bar: what an engine predicts with the properties that it assumes.
+
+    Args:
+        name: of the assumed engine.
+        arrays: scenes, starts and controls of some pushes, by variable name.
+        info: of their store.
+
+    Raises:
+        Diverged: the engine left the numbers.
+    """
+    scene, initial = to_scene(arrays, info), to_initial(arrays)
+    engine = make_assumed_engine(name)
+    trajectory = roll_out(engine, scene, initial, to_controls(arrays, info))
+    motion, _ = from_trajectory(trajectory)
+    if not np.isfinite(motion).all():
+        push = int(np.argmin(np.isfinite(motion).all((1, 2, 3))))
+        raise Diverged(f"{name} left the numbers in push {push}.")
+    return motion
+
+
+def _is_finished(out: Path, config: dict[str, Any]) -> bool:
+    """Whether the folder holds this very store; a folder of other things is refused."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return False
+    finished = open_run(out, config, finished_by=HASHES).is_finished
+    if finished:
+        _log.info("%s is finished already", out)
+    return finished
+
+
+@contextmanager
+def _whole_or_nothing(out: Path) -> Iterator[Path]:
+    """Give a folder beside `out` that takes its place if all went well."""
+    place = out.resolve()
+    folder = place.with_name(f".{place.name}.{uuid.uuid4().hex}.partial")
+    try:
+        yield folder
+        # Only of a damaged store of the same settings: all of it was made again.
+        if (place / CONFIG).is_file():
+            shutil.rmtree(place)
+        os.replace(folder, place)
+    except OSError as error:
+        raise write_error(out, error) from error
+    except BadInput as error:
+        # The user knows nothing of the folder beside.
+        raise BadInput(str(error).replace(str(folder), str(out))) from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,83 @@
+"""`sainet import` as a user types it, and physics evaluated on what it made."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from datasets.own_pushes import PROPERTIES, rows, to_csv, write
+from datasets.raw_pushes import name, pack, recording, to_json
+from sainet.cli.entry import run
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> dict[str, list[str]]:
+    """The arguments of each format."""
+    zipped = pack(tmp_path / "in" / "ellip1_json.zip", {name(): to_json(recording())})
+    table, bodies = write(tmp_path / "in", to_csv(rows()))
+    return {
+        "mitpush": [str(zipped)],
+        "table": [str(table), "--properties", str(bodies)],
+    }
+
+
+@pytest.mark.parametrize("form", ["mitpush", "table"])
+def test_physics_is_evaluated_on_what_was_imported(
+    sources, tmp_path: Path, capfd: pytest.CaptureFixture[str], form: str
+):
+    out = str(tmp_path / "out")
+    assert run(["import", form, *sources[form], "--out", out, "--json"]) == 0
+    assert json.loads(capfd.readouterr().out.splitlines()[-1])["pushes"] == 1
+    models = ["physics", "physics-calibrated"]
+    words = ["evaluate", "--model", *models, "--data", out, "--json", "--quiet"]
+    assert run([*words, "--devices", "2"]) == 0
+    found = json.loads(capfd.readouterr().out.splitlines()[-1])["rows"]
+    assert {row["model"] for row in found} == set(models)
+    assert all(row["n"] == 1 and 0 < row["pos_mm"] < 100 for row in found)
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        (["table", "TABLE"], "--properties is missing"),
+        (["mitpush", "ZIP", "--properties", "BODIES"], "--properties is for the"),
+        (["mitpush", "TABLE"], "is no .zip and no folder"),
+        (["table", "ZIP", "--properties", "BODIES"], "is no .csv and no .parquet"),
+        (["table", "TABLE", "--properties", "TABLE"], "is no TOML"),
+    ],
+)
+def test_bad_usage_is_one_line_and_status_2(
+    sources, tmp_path: Path, capfd: pytest.CaptureFixture[str], words, wanted
+):
+    (zipped,), (table, _, bodies) = sources["mitpush"], sources["table"]
+    known = {"ZIP": zipped, "TABLE": table, "BODIES": bodies}
+    words = [known.get(word, word) for word in words]
+    assert run(["import", *words, "--out", str(tmp_path / "out")]) == 2
+    error = capfd.readouterr().err
+    assert error.startswith("sainet: ")
+    assert wanted in error
+    assert len(error.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["in"]
+
+
+def test_the_command_line_goes_before_the_properties(sources, tmp_path: Path):
+    out = tmp_path / "out"
+    words = ["import", "table", *sources["table"], "--out", str(out)]
+    assert run([*words, "--contact-friction", "0.35", "--quiet"]) == 0
+    config = json.loads((out / "config.json").read_text())
+    assert config["contact_friction"] == 0.35
+    assert "contact = 0.2" in PROPERTIES
+
+
+def test_the_example_of_the_documentation_is_imported(tmp_path: Path):
+    """Its five rows, with the one that is missing for a whole push."""
+    text = (Path(__file__).parents[2] / "docs" / "importing.md").read_text()
+    blocks = [
+        line.removeprefix("    ") for line in text.splitlines() if line[:4] == "    "
+    ]
+    start = blocks.index("push,time,body,x,y,angle,pusher_x,pusher_y")
+    table = blocks[start : start + 6] + ["1,0.008,blue,0.4050,0,0,0.2454,0.0010"]
+    properties = "\n".join(blocks[blocks.index("[bodies.red]") :])
+    path, bodies = write(tmp_path / "in", "\n".join([*table, ""]), properties)
+    words = ["import", "table", str(path), "--properties", str(bodies)]
+    assert run([*words, "--out", str(tmp_path / "out"), "--quiet"]) == 0

@@ -1,0 +1,353 @@
+"""Somebody's own pushes as a store: what is kept, and what is refused with its row."""
+
+import json
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from datasets.own_pushes import (
+    HEADER,
+    PROPERTIES,
+    SPEED,
+    at,
+    pusher_at,
+    rows,
+    to_csv,
+    to_parquet,
+    write,
+)
+from datasets.stores import assert_same_files, contents
+from sainet.datasets.batch import to_batch
+from sainet.datasets.table import import_table
+from sainet.errors import BadInput, BadTable, MissingExtra, RunConflict
+from support import require
+
+WITHIN = np.arange(1, 97) / 240  # s
+GROUPED = [*HEADER, "group"]
+
+
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory):
+    """A push at 250 Hz and a shorter one at 30 Hz, rows of both and of bodies mixed."""
+    folder = tmp_path_factory.mktemp("table")
+    fast = [[*row, "rubber"] for row in rows("first")]
+    slow = [[*row, "wood"] for row in rows("second", 30, 0.3)]
+    mixed = [
+        row for k in range(len(fast)) for row in (*fast[k : k + 1], *slow[k : k + 1])
+    ]
+    return import_table(*write(folder / "in", to_csv(mixed, GROUPED)), folder / "out")
+
+
+def test_what_comes_out_is_the_motion_that_went_in(imported):
+    arrays = imported.read(slice(None))
+    for push, steps in enumerate((96, 72)):
+        for body, name in enumerate(("far", "near")):  # the order of the TOML
+            found = arrays["truth"][push, :steps, body, :3]
+            wanted = at(name, WITHIN[:steps])
+            np.testing.assert_allclose(found[:, :2], wanted[:, :2], atol=1e-6)
+            np.testing.assert_allclose(found[:, 2], wanted[:, 2], atol=1e-5)
+            start = at(name, np.zeros(1))[0]
+            initial = arrays["initial"][push, body]
+            np.testing.assert_allclose(initial[:3], start, atol=1e-6)
+            assert not initial[3:].any()
+        command = arrays["command_position"][push, :steps]
+        np.testing.assert_allclose(command, pusher_at(WITHIN[:steps]), atol=1e-6)
+        assert arrays["pose_observed"][push].sum() == steps
+        assert np.isnan(arrays["truth"][push, steps:]).all()
+    rate, known = arrays["truth"][0, :, 0, 3], arrays["rate_observed"][0] > 0
+    assert known.sum() == 96 - 24
+    np.testing.assert_allclose(rate[known], SPEED["far"], rtol=1e-4)
+
+
+def test_the_store_says_what_the_properties_say(imported):
+    info = imported.info
+    assert (info.kind, info.engine, info.bodies) == ("robot", "recorded", 2)
+    assert info.groups == ("rubber", "wood")
+    arrays = imported.read(slice(None))
+    assert arrays["steps"].tolist() == [120, 80]  # whole buckets, the rest held
+    assert arrays["group"].tolist() == [0, 1]
+    for name, value in {
+        **{"mass": [1.0, 0.5], "radius": [0.05, 0.04], "pusher_radius": 0.005},
+        **{"table_friction": 0.3, "disk_friction": 0.2, "pusher_friction": 0.2},
+    }.items():
+        np.testing.assert_allclose(arrays[name] - np.float32(value), 0, atol=1e-7)
+    batch = to_batch(arrays, info, simulated="planar-calibrated")
+    assert int(batch.pose_observed.sum()) == 96 + 72
+    config = json.loads((imported.path / "config.json").read_text())
+    assert config["bodies"] == ["far", "near"]
+
+
+def test_what_lies_in_a_long_gap_is_not_made_up(tmp_path: Path):
+    table, bodies = write(tmp_path, to_csv(rows(rate=2.5, duration=2.0)))
+    arrays = import_table(table, bodies, tmp_path / "out").read(slice(None))
+    seen = np.flatnonzero(arrays["pose_observed"][0])
+    around = {k + side - 1 for k in range(0, 481, 96) for side in (-1, 0, 1)}
+    assert seen.tolist() == sorted(around - {-2, -1, 480})
+    assert not arrays["rate_observed"].any()
+
+
+def test_angles_may_be_wrapped_and_frictions_left_out(tmp_path: Path):
+    wrapped = [[*r[:5], (r[5] + np.pi) % (2 * np.pi) - np.pi, *r[6:]] for r in rows()]
+    spare = PROPERTIES.partition("[friction]")[0] + "[bodies.spare]\nmass=1\nradius=1\n"
+    table, bodies = write(tmp_path, "\ufeff" + to_csv(wrapped), spare)
+    store = import_table(table, bodies, tmp_path / "out", contact_friction=0.4)
+    arrays = store.read(slice(None))
+    angle = arrays["truth"][0, :96, 1, 2]
+    np.testing.assert_allclose(angle, at("near", WITHIN)[:, 2], atol=1e-5)
+    assert store.info.bodies == 2
+    assert arrays["table_friction"] == pytest.approx(0.15)
+    assert arrays["pusher_friction"] == pytest.approx(0.4)
+
+
+def test_the_same_input_gives_the_same_bytes_and_other_input_is_refused(
+    tmp_path: Path,
+):
+    table, bodies = write(tmp_path / "in", to_csv(rows()))
+    for out in ("one", "two", "two"):
+        import_table(table, bodies, tmp_path / out)
+    assert_same_files(tmp_path / "one", tmp_path / "two")
+    before = contents(tmp_path / "one")
+    bodies.write_text(PROPERTIES.replace("0.04", "0.039"))
+    with pytest.raises(RunConflict, match="radius"):
+        import_table(table, bodies, tmp_path / "one")
+    assert contents(tmp_path / "one") == before
+
+
+def change(row: int, column: str, value):
+    """A table with one value changed; row 2 is the first below the header."""
+    table = rows()
+    table[row - 2][HEADER.index(column)] = value
+    return to_csv(table)
+
+
+def each(column: str, factor: float):
+    table = rows()
+    for row in table:
+        row[HEADER.index(column)] *= factor
+    return to_csv(table)
+
+
+def swapped(one: int, other: int) -> str:
+    table = rows()
+    table[one - 2], table[other - 2] = table[other - 2], table[one - 2]
+    return to_csv(table)
+
+
+def renamed(old: str, new: str) -> str:
+    return to_csv(rows()).replace(old, new, 1)
+
+
+def in_groups() -> str:
+    return to_csv([[*r, k > 7] for k, r in enumerate(rows())], GROUPED)
+
+
+HOSTILE = {
+    "empty": ("", "is empty"),
+    "header alone": (to_csv([]), "has no rows"),
+    "no text": (b"\xff\xfe\0", "is no CSV text"),
+    "missing column": (renamed(",angle", ""), "row 1: column angle is missing"),
+    "column twice": (renamed("angle", "x"), "row 1: column x is there twice"),
+    "unknown column": (
+        to_csv([[*r, 0] for r in rows()], [*HEADER, "z"]),
+        "row 1: column 'z' is unknown",
+    ),
+    "cut row": (to_csv(rows())[:-30], "row 203: has .* fields, not 8"),
+    "no number": (change(9, "y", "left"), "row 9: y is 'left', which is no number"),
+    "underscore": (change(9, "x", "0_2"), "row 9: x is '0_2', which is no number"),
+    "empty field": (change(9, "y", ""), "row 9: y is '', which is no number"),
+    "nan": (change(10, "x", "nan"), "row 10: x is nan; it must be finite"),
+    "infinite": (change(10, "time", "1e999"), "row 10: time is inf"),
+    "no push": (change(4, "push", " "), "row 4: push is empty"),
+    "unknown body": (
+        change(7, "body", "mid"),
+        "row 7: body 'mid' has no properties; add .* to .*bodies.toml",
+    ),
+    "backwards": (
+        swapped(20, 22),
+        "row 22: push '1': .* comes after",
+    ),
+    "repeated": (change(22, "time", 0.036), "row 22: .* is there twice"),
+    "duplicate row": (to_csv([*rows(), rows()[-1]]), "row 204: .* is there twice"),
+    "body missing": (
+        to_csv(rows() + [r for r in rows("b") if r[2] == "far"]),
+        "row 204: push 'b': body 'near' is missing",
+    ),
+    "body missing at a time": (
+        to_csv(rows()[:100] + rows()[101:]),
+        r"row 102: push '1': body 'near' is missing at time 0\.2",
+    ),
+    "body at another time": (
+        to_csv(rows()[:101] + rows()[102:]),
+        r"row 102: push '1': another body is missing at time 0\.2",
+    ),
+    "pusher in two places": (
+        change(15, "pusher_x", 0.2),
+        "row 14: push '1': the pusher is elsewhere",
+    ),
+    "jump": (change(100, "x", 0.25), "row 100: push '1': the body jumps"),
+    "jump of the angle": (change(100, "angle", 2.5), "row 100: .*: the angle jumps"),
+    "millimetres": (each("y", 1000), "y is 100: looks like millimetres; .* in metres"),
+    "pusher in millimetres": (
+        each("pusher_x", 1000),
+        "pusher_x is .*: looks like millimetres",
+    ),
+    "degrees": (each("angle", 57.3), "angle is .*: looks like degrees; .* in radians"),
+    "milliseconds": (each("time", 1000), "looks like milliseconds; .* in seconds"),
+    "one sample": (to_csv(rows()[:2]), "row 3: push '1': body 'far' has one sample"),
+    "too short": (to_csv(rows(rate=5000)[:4]), "push '1' lasts less than a step"),
+    "groups": (in_groups(), "row .*: push '1' is in several groups"),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE)
+def test_hostile_tables_give_one_line_with_the_row_and_leave_nothing(
+    tmp_path: Path, case: str
+):
+    text, wanted = HOSTILE[case]
+    table, bodies = write(tmp_path, text)
+    with pytest.raises(BadTable, match=wanted) as caught:
+        import_table(table, bodies, tmp_path / "out")
+    assert str(caught.value).startswith(f"{table}: ")
+    assert len(str(caught.value).splitlines()) == 1
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["bodies.toml", "pushes.csv"]
+
+
+def test_degrees_of_small_turns_are_recognised_by_what_moves(tmp_path: Path):
+    """Ten degrees, given as ten: never beyond twenty, and no sample jumps."""
+    table = rows(duration=1.0)
+    for k, row in enumerate(table):
+        row[5] = 10 * k / len(table)
+    with pytest.raises(BadTable, match=r"row 3: .* changes by .* looks like degrees"):
+        import_table(*write(tmp_path, to_csv(table)), tmp_path / "out")
+
+
+BAD_PROPERTIES = {
+    "no toml": ("[bodies", "is no TOML"),
+    "no bodies": ("[pusher]\nradius=1\n", "'bodies' is missing"),
+    "no pusher": (PROPERTIES.replace("pusher", "bodies.p"), "'pusher' is missing"),
+    "no mass": (PROPERTIES.replace("mass = 1.0", ""), r"\[bodies.'far'\] has no mass"),
+    "negative": (
+        PROPERTIES.replace("1.0", "-1.0"),
+        "mass is -1.0; it must",
+    ),
+    "huge": (PROPERTIES.replace("1.0", "9" * 400), "mass is 9+; it must be positive"),
+    "text": (PROPERTIES.replace("1.0", "'1'"), "mass is '1'; it must be positive"),
+    "truth": (PROPERTIES.replace("1.0", "true"), "mass is True; it must be positive"),
+    "nan": (PROPERTIES.replace("0.05", "nan"), "radius is nan; it must be positive"),
+    "millimetres": (PROPERTIES.replace("0.05", "52.5"), "looks like millimetres"),
+    "grams": (PROPERTIES.replace("1.0", "896"), "looks like grams"),
+    "unknown field": (
+        PROPERTIES.replace("mass", "weight", 1),
+        "unknown field 'weight'",
+    ),
+    "unknown section": (PROPERTIES + "[robot]\na=1\n", "unknown field 'robot'"),
+    "friction": (
+        PROPERTIES.replace("0.3", "-0.3"),
+        "table is -0.3; it must",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_PROPERTIES)
+def test_bad_properties_are_named(tmp_path: Path, case: str):
+    text, wanted = BAD_PROPERTIES[case]
+    table, bodies = write(tmp_path, to_csv(rows()), text)
+    with pytest.raises(BadTable, match=wanted) as caught:
+        import_table(table, bodies, tmp_path / "out")
+    assert str(caught.value).startswith(f"{bodies}: ")
+    assert len(str(caught.value).splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("radius", ["0.057", "0.06"])
+def test_disks_that_overlap_have_a_wrong_radius(tmp_path: Path, radius: str):
+    """The disks are 100 mm apart, their radii sum up to 90."""
+    larger = PROPERTIES.replace("0.05\n", f"{float(radius) + 0.01}\n")
+    table, bodies = write(tmp_path, to_csv(rows()), larger)
+    with pytest.raises(BadTable, match=r"'far' and 'near' overlap by .* their radii"):
+        import_table(table, bodies, tmp_path / "out")
+
+
+def test_files_that_are_none_are_refused(tmp_path: Path):
+    table, bodies = write(tmp_path, to_csv(rows()))
+    for path in (tmp_path / "no.csv", tmp_path, tmp_path / "no.parquet"):
+        with pytest.raises(BadTable, match=str(path)):
+            import_table(path, bodies, tmp_path / "out")
+    with pytest.raises(BadTable, match="cannot be read"):
+        import_table(table, tmp_path / "no.toml", tmp_path / "out")
+    with pytest.raises(BadInput, match="--contact-friction is -1"):
+        import_table(table, bodies, tmp_path / "out", contact_friction=-1)
+    assert not (tmp_path / "out").exists()
+
+
+def needs_parquet() -> None:
+    require(find_spec("pyarrow"), "pyarrow is missing: pip install 'sainet[table]'")
+
+
+def as_parquet(tmp_path: Path, data: bytes) -> tuple[Path, Path]:
+    _, bodies = write(tmp_path, "")
+    path = tmp_path / "pushes.parquet"
+    path.write_bytes(data)
+    return path, bodies
+
+
+def test_parquet_gives_the_same_as_csv(tmp_path: Path):
+    needs_parquet()
+    table = [[*row, "wood"] for row in rows("7") + rows("3")]
+    one = import_table(*write(tmp_path, to_csv(table, GROUPED)), tmp_path / "one")
+    numbered = [[int(row[0]), *row[1:]] for row in table]
+    for form, written in {"text": table, "numbers": numbered}.items():
+        path, bodies = as_parquet(tmp_path, to_parquet(written, GROUPED))
+        other = import_table(path, bodies, tmp_path / form).read(slice(None))
+        for name, value in one.read(slice(None)).items():
+            np.testing.assert_array_equal(other[name], value, err_msg=name)
+
+
+def without(column: int, row: int = 4) -> list[list]:
+    table = rows()
+    table[row - 1][column] = None
+    return table
+
+
+HOSTILE_PARQUET = {
+    "damaged": (lambda: to_parquet(rows())[:-40], "is damaged or no Parquet file"),
+    "empty": (lambda: b"", "is damaged or no Parquet file"),
+    "no rows": (lambda: to_parquet([]), "column .* holds null|has no rows"),
+    "missing": (lambda: to_parquet(rows(), HEADER[:-1]), "column pusher_y is missing"),
+    "unknown": (
+        lambda: to_parquet([[*r, 0] for r in rows()], [*HEADER, "__index_level_0__"]),
+        "'__index_level_0__' is unknown",
+    ),
+    "null": (lambda: to_parquet(without(3)), "row 4: x is nan"),
+    "no push": (lambda: to_parquet(without(0)), "row 4: push is empty"),
+    "text": (
+        lambda: to_parquet([[*r[:3], str(r[3]), *r[4:]] for r in rows()]),
+        "column x holds string, not numbers",
+    ),
+    "lists": (
+        lambda: to_parquet([[[1], *r[1:]] for r in rows()]),
+        "column push holds list.*, not text",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", HOSTILE_PARQUET)
+def test_hostile_parquet_gives_one_line(tmp_path: Path, case: str):
+    needs_parquet()
+    make, wanted = HOSTILE_PARQUET[case]
+    path, bodies = as_parquet(tmp_path, make())
+    with pytest.raises(BadTable, match=wanted) as caught:
+        import_table(path, bodies, tmp_path / "out")
+    assert len(str(caught.value).splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_pyarrow_the_message_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtra, match=r'pip install "sainet\[table\]"'):
+        import_table(*as_parquet(tmp_path, b"PAR1"), tmp_path / "out")
