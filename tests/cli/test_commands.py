@@ -153,6 +153,34 @@ def test_control(tmp_path):
     assert not (tmp_path / "x").exists()
 
 
+def shown(*words):
+    return " ".join(sainet(*words, "--help").stdout.replace("│", " ").split())
+
+
+def test_going_on_from_a_network_has_defaults_of_its_own():
+    usual, tuned = shown("train", "in"), shown("train", "in", "--start-from", "in")
+    assert "Number of gradient steps. (default: 10000)" in usual
+    assert "Number of gradient steps. (default: 1000)" in tuned
+    assert "(default: error)" in tuned
+    assert shown("train", "in", "--start-from=in") == tuned
+
+
+def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
+    few = ("--iterations", 2, "--batch-size", 4, "--steps", 5, "--quiet", "--json")
+    words = ("train", "in", "--start-from", "in", "--data", pushes)
+    done = sainet(*words, "--out", tmp_path / "tuned", *few)
+    assert json.loads(done.stdout.splitlines()[-1])["model"] == "in"
+    card = json.loads((tmp_path / "tuned/card.json").read_text())
+    assert card["started_from"]
+    assert card["config"]["validation_share"] == 0.2
+    words = ("identify", "--data", pushes, "--out", tmp_path / "mine")
+    found = sainet(*words, "--json", "--quiet").stdout
+    estimates = json.loads(found.splitlines()[-1])["estimates"]
+    assert [e["name"] for e in estimates][0] == "pusher_friction"
+    error = sainet(*words, "--group", "ice", status=2).stderr
+    assert "no group 'ice'; it has none" in error
+
+
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):
     out = tmp_path / "net"
     few = ("--iterations", 1, "--batch-size", 4, "--steps", 5, "--quiet")
