@@ -7,12 +7,11 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
-from scipy.optimize import least_squares
 
 from sainet.datasets.store import Store
 from sainet.engines.identified import FILE
 from sainet.errors import BadStore
+from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     BOUNDS,
     Estimate,
@@ -23,19 +22,13 @@ from sainet.identification.residuals import (
     Sample,
     Scale,
     pose_errors,
-    residuals,
     samples,
-    slopes,
 )
+from sainet.identification.solve import solve
 from sainet.runs import open_run, read_json, write_json
 
-_RESAMPLES = 2_000
-_INTERVAL = (2.5, 97.5)  # percent
-_BOOTSTRAP = 0x1DE47
 _VAGUE = 3.0  # ratio of the ends of an interval, from which a value is not told
 _AT_BOUND = 1.01  # ratio to it
-_INSIDE = 1e-3  # of a bound, where a search begins (log of the value)
-_RIDGE = 1e-6  # of the largest slope: what the data say nothing of stays where it was
 
 
 @dataclass(frozen=True)
@@ -106,8 +99,8 @@ def identify(store: Store) -> Identified:
     values, known, doubtful = start, {}, {}
     while len(doubtful) < len(start):
         free = [name for name in start if name not in doubtful]
-        values = _solve(start, free, scale, parts)
-        known = _intervals(values, free, scale, parts)
+        values = solve(start, free, scale, parts)
+        known = intervals(values, free, scale, parts)
         doubts = {name: _doubt(name, values[name], *known[name]) for name in free}
         new = {n: (doubt, known[n]) for n, doubt in doubts.items() if doubt}
         if not new:
@@ -125,75 +118,6 @@ def identify(store: Store) -> Identified:
         before_deg=before[1],
         after_deg=after[1],
     )
-
-
-def _solve(
-    start: Mapping[str, float],
-    free: Sequence[str],
-    scale: Scale,
-    parts: Sequence[Sample],
-) -> dict[str, float]:
-    """Return the best values of the free parameters, the others as they were."""
-    bounds = np.log([BOUNDS[name] for name in free]).T
-    first = np.log([start[name] for name in free])
-
-    def logs(vector: np.ndarray) -> dict[str, float]:
-        given = dict(zip(free, vector.tolist(), strict=True))
-        return {name: given.get(name, float(np.log(v))) for name, v in start.items()}
-
-    def residual(vector: np.ndarray) -> np.ndarray:
-        found = [residuals(logs(vector), scale, part).ravel() for part in parts]
-        return np.concatenate(found)
-
-    def slope(vector: np.ndarray) -> np.ndarray:
-        found = [slopes(logs(vector), free, scale, part) for part in parts]
-        return np.concatenate([part.reshape(-1, len(free)) for part in found])
-
-    solution = least_squares(
-        residual,
-        np.clip(first, bounds[0] + _INSIDE, bounds[1] - _INSIDE),
-        slope,  # pyright: ignore[reportArgumentType]
-        bounds=bounds,
-        loss="soft_l1",
-        x_scale="jac",
-    )
-    return {name: float(np.exp(value)) for name, value in logs(solution.x).items()}
-
-
-def _intervals(
-    values: Mapping[str, float],
-    free: Sequence[str],
-    scale: Scale,
-    parts: Sequence[Sample],
-) -> dict[str, tuple[float, float]]:
-    """Return the 95 % interval of each free parameter, over pushes like these."""
-    logs = {name: float(np.log(value)) for name, value in values.items()}
-    matrices, vectors = [], []
-    for part in parts:
-        error, slope = residuals(logs, scale, part), slopes(logs, free, scale, part)
-        weight = 1 / np.sqrt(1 + error**2)  # of the soft l1 loss
-        matrices.append(np.einsum("pn,pni,pnj->pij", weight, slope, slope))
-        vectors.append(np.einsum("pn,pni,pn->pi", weight, slope, error))
-    steps = _resampled_steps(np.concatenate(matrices), np.concatenate(vectors))
-    found = {}
-    for index, name in enumerate(free):
-        draws = np.clip(logs[name] - steps[:, index], *np.log(BOUNDS[name]))
-        low, high = np.exp(np.percentile(draws, _INTERVAL))
-        found[name] = (float(low), float(high))
-    return found
-
-
-def _resampled_steps(
-    matrix: Float[np.ndarray, "push p p"], vector: Float[np.ndarray, "push p"]
-) -> Float[np.ndarray, "resample p"]:
-    """Return the Gauss-Newton step from the solution on each resample of the pushes."""
-    pushes, size = vector.shape
-    rng = np.random.default_rng(_BOOTSTRAP)
-    counts = rng.multinomial(pushes, np.full(pushes, 1 / pushes), _RESAMPLES)
-    ridge = _RIDGE * np.trace(matrix.sum(axis=0)) * np.eye(size)
-    left = np.einsum("rp,pij->rij", counts, matrix) + ridge
-    right = np.einsum("rp,pi->ri", counts, vector)
-    return np.linalg.solve(left, right[..., None])[..., 0]
 
 
 def _estimate(
