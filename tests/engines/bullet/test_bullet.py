@@ -14,7 +14,7 @@ from contracts.worlds import far_away, make_scene, moving, pushed, rows
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
-from sainet.errors import MissingExtra
+from sainet.errors import BadScene, MissingExtra
 from sainet.scene import GRAVITY, FrictionField
 from support import require
 
@@ -95,3 +95,23 @@ def test_nothing_is_printed():
     )
     assert done.stdout == "{}\n"
     assert not done.stderr
+
+
+def in_a_row(disks):
+    scene = make_scene([[1.0] * disks], [[0.05] * disks])
+    place = np.stack([0.2 * np.arange(disks), np.zeros(disks)], axis=-1)
+    start = moving(place[None], np.full((1, disks, 2), 0.05), np.zeros((1, disks)))
+    return scene, start, far_away(1, 4)
+
+
+def test_every_disk_that_bullet_has_a_group_for_slides_and_one_more_is_refused():
+    final = roll_out(make_engine("bullet"), *in_a_row(30)).final
+    moved = np.asarray(final.position)[0] - [[0.2 * i, 0] for i in range(30)]
+    np.testing.assert_allclose(
+        moved, np.broadcast_to(moved[:1], moved.shape), atol=1e-6
+    )
+    assert moved.min() > 1e-4
+    with pytest.raises(
+        BadScene, match="has 31 disks; Bullet has collision groups for 30"
+    ):
+        roll_out(make_engine("bullet"), *in_a_row(31))

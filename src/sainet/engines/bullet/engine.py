@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array
 
 from sainet.engines.base import AbstractEngine
-from sainet.errors import MissingExtra
+from sainet.errors import BadScene, MissingExtra
 from sainet.pushes import Controls, ForceControls, PathControls
 from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from sainet.engines.bullet.world import Job
 
 _NEWEST_PYTHON = (3, 11)  # that PyBullet has wheels for
+
+MOST_DISKS = 30  # each has a bit of its own in a mask of 31, the first is for all
 
 
 class BulletEngine(AbstractEngine):
@@ -38,9 +40,18 @@ class BulletEngine(AbstractEngine):
         return True
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
-        """Return the states after each step of the controls."""
+        """Return the states after each step of the controls.
+
+        Raises:
+            BadScene: more disks than Bullet has collision groups for.
+        """
         from sainet.engines.bullet.pool import roll_everywhere
 
+        if scene.body_count > MOST_DISKS:
+            raise BadScene(
+                f"scene: it has {scene.body_count} disks; Bullet has collision groups "
+                f"for {MOST_DISKS} of them. Take fewer, or the planar engine."
+            )
         batch = scene.batch_shape
         moved = roll_everywhere(_jobs(scene, initial, controls))
         motion, pusher = (
