@@ -1,9 +1,10 @@
 """Run the commands whose figures stand in docs/results.md, and write them there.
 
-    python tools/results.py [SECTION ...] [--recorded FOLDER]
+    python tools/results.py [SECTION ...]
 
 Each section is a command, its figures and the machine; none is typed by hand. Finished
 runs are not made again. Sections that are not named stay as they stand in the page.
+Recorded pushes are looked for in ../shared/data or $SAINET_DATA.
 """
 
 import argparse
@@ -30,12 +31,13 @@ PAGE = ROOT / "docs" / "results.md"
 def main() -> None:
     """Measure what is asked for and write it into the page."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("sections", nargs="*", choices=[[], *SECTIONS], default=[])
-    parser.add_argument("--recorded", type=Path, default=_recorded_folder())
-    options = parser.parse_args()
-    os.environ["SAINET_RECORDED"] = str(options.recorded)
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help=str([*SECTIONS]))
+    chosen = parser.parse_args().sections
+    unknown = set(chosen) - SECTIONS.keys()
+    if unknown:
+        parser.error(f"no section {sorted(unknown)[0]!r}; there are {[*SECTIONS]}")
     parts = _standing()
-    for name in options.sections or SECTIONS:
+    for name in chosen or SECTIONS:
         title, write = SECTIONS[name]
         parts[title] = f"## {title}\n\n{write().strip()}\n"
         ordered = [parts[title] for title, _ in SECTIONS.values() if title in parts]
@@ -100,7 +102,7 @@ def _trainings(folder: Path) -> str:
 
 def _imported() -> Path:
     data = RUNS / "recorded"
-    file = Path(os.environ["SAINET_RECORDED"]) / "ellip1_endpoints.csv"
+    file = _recorded_folder() / "ellip1_endpoints.csv"
     _run("import", "mitpush-endpoints", str(file), "--out", str(data))
     return data
 

@@ -116,7 +116,7 @@ def test_a_recording_that_is_no_number_is_trouble():
 def test_a_goal_out_of_reach_is_named_as_the_reason():
     episode = run(Rail(step=0.001), pushes=3)
     assert episode.reason == (
-        "out of pushes: the goal was 50 mm away, out of reach of 3 pushes of 10 mm"
+        "out of pushes: the goal was 50 mm away, and 3 x 10 mm do not reach it"
     )
 
 

@@ -134,6 +134,16 @@ def test_a_process_that_is_interrupted_keeps_its_pushes_and_the_next_one_starts_
     assert not (out / "episodes/000.interrupted.json").exists()
 
 
+def test_a_turn_that_lacks_something_is_named(tmp_path, done):
+    out = tmp_path / "out"
+    shutil.copytree(done[0], out)
+    known = json.loads(episode_file(out, 0).read_text())
+    del known["turns"][1]["planned"]
+    episode_file(out, 0).write_text(json.dumps(known))
+    with pytest.raises(BadInput, match=r"turns\[1\].planned is missing.*delete it"):
+        run_trials(CONFIG, out)
+
+
 def test_models_see_the_same_worlds_and_their_own_properties():
     one, same = (make_trial(replace(CONFIG, model=m), 3) for m in ("physics", "in"))
     np.testing.assert_array_equal(one.task.goal, same.task.goal)

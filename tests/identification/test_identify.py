@@ -118,6 +118,8 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
     engine = model.dynamics.engine
     assert engine.pusher_friction == result["values"]["pusher_friction"]
     assert isinstance(engine.engine, PlanarEngine)
+    with pytest.raises(BadInput, match="of the planar engine, not of bullet"):
+        load_dynamics(str(out), engine="bullet")
     before = (out / FILE).stat().st_mtime_ns
     assert identify_into(store, out) == result
     assert (out / FILE).stat().st_mtime_ns == before

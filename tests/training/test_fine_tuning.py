@@ -134,6 +134,11 @@ def test_validation_pushes_are_drawn_at_random_and_not_trained_on(store):
     other = Task("in", store, replace(TUNING, seed=1), "planar")
     assert set(other.validation.rows) != validation
     assert validation != set(range(16, 20))
+    for share in (0.01, 0.99):  # of two pushes, one remains on either side
+        few = Task(
+            "in", store.first(2), replace(TUNING, validation_share=share), "planar"
+        )
+        assert (len(few.training.rows), len(few.validation.rows)) == (1, 1)
 
 
 def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):

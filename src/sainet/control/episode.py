@@ -123,8 +123,8 @@ def _out_of_pushes(
     if reach >= away:
         return "out of pushes"
     return (
-        f"out of pushes: the goal was {1000 * away:.0f} mm away, out of reach of "
-        f"{pushes} pushes of {1000 * planner.actions.length:g} mm"
+        f"out of pushes: the goal was {1000 * away:.0f} mm away, and {pushes} x "
+        f"{1000 * planner.actions.length:g} mm do not reach it"
     )
 
 

@@ -34,6 +34,7 @@ _FIELDS: dict[str, type | tuple[type, ...]] = {
     "table_friction": _NUMBER,
     "turns": list,
 }
+_TURN_FIELDS = ("observed", "planned", "actual", "pusher")
 
 
 def record(
@@ -81,6 +82,12 @@ def read_record(path: Path) -> dict[str, Any]:
         if not isinstance(found.get(name), kind):
             what = "is missing" if name not in found else f"is {found[name]!r}"
             raise BadInput(f"{path}: {name} {what}, so it is no episode; {again}.")
+    for index, turn in enumerate(found["turns"]):
+        known = turn if isinstance(turn, dict) else {}
+        for name in _TURN_FIELDS:
+            if not isinstance(known.get(name), list):
+                where = f"turns[{index}].{name}"
+                raise BadInput(f"{path}: {where} is missing or no list; {again}.")
     return found
 
 

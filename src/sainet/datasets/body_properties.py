@@ -3,7 +3,7 @@
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from sainet.datasets.mitpush_log import read_bytes
 from sainet.datasets.recorded import (
@@ -14,9 +14,21 @@ from sainet.datasets.recorded import (
 from sainet.errors import BadTable
 
 EXAMPLE = "[bodies.NAME] with mass = 0.9 and radius = 0.05, and [pusher] radius = 0.005"
-_LARGEST_RADIUS = 1.0  # m
-_LARGEST_MASS = 100.0  # kg
 _SECTIONS = {"bodies", "pusher", "friction"}
+
+
+class _Most(NamedTuple):
+    """The largest value that is believed, and what a larger one seems to be in."""
+
+    value: float
+    unit: str
+    seems: str
+
+
+_LARGEST = {
+    "mass": _Most(100.0, "kilograms", "grams"),
+    "radius": _Most(1.0, "metres", "millimetres"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,9 +71,9 @@ def read_properties(
     contact = _friction(path, friction, "contact", CONTACT_FRICTION)
     found = BodyProperties(
         names=names,
-        mass=tuple(_mass(path, _body(name), bodies[name]) for name in names),
-        radius=tuple(_radius(path, _body(name), bodies[name]) for name in names),
-        pusher_radius=_radius(path, "[pusher]", pusher),
+        mass=tuple(_property(path, _body(n), bodies[n], "mass") for n in names),
+        radius=tuple(_property(path, _body(n), bodies[n], "radius") for n in names),
+        pusher_radius=_property(path, "[pusher]", pusher, "radius"),
         table_friction=table,
         contact_friction=contact if contact_friction is None else contact_friction,
     )
@@ -117,22 +129,13 @@ def _number(value: object) -> float:
         return float("nan")
 
 
-def _mass(path: Path, where: str, content: dict[str, Any]) -> float:
-    value = _positive(path, where, content, "mass")
-    if value > _LARGEST_MASS:
+def _property(path: Path, where: str, content: dict[str, Any], name: str) -> float:
+    """Return a mass or a radius that is not in other units."""
+    value, most = _positive(path, where, content, name), _LARGEST[name]
+    if value > most.value:
         raise BadTable(
-            f"{path}: {where} mass is {value:g}: looks like grams; masses are in "
-            "kilograms."
-        )
-    return value
-
-
-def _radius(path: Path, where: str, content: dict[str, Any]) -> float:
-    value = _positive(path, where, content, "radius")
-    if value > _LARGEST_RADIUS:
-        raise BadTable(
-            f"{path}: {where} radius is {value:g}: looks like millimetres; radii are "
-            "in metres."
+            f"{path}: {where} {name} is {value:g}: looks like {most.seems}; it is in "
+            f"{most.unit}."
         )
     return value
 

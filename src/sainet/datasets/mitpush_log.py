@@ -88,7 +88,7 @@ def read_bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise BadTable(
-            f"{path}: cannot be read ({error.strerror}); check its permissions."
+            f"{path}: cannot be read ({error.strerror}); check path and permissions."
         ) from None
 
 

@@ -6,7 +6,7 @@ from sainet.engines import ASSUMED_ENGINES, CALIBRATED, make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
 from sainet.engines.identified import FILE as IDENTIFIED
 from sainet.engines.identified import read_identified
-from sainet.errors import BadCheckpoint, UnknownName
+from sainet.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.models.card import CARD, Card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import (
@@ -41,6 +41,7 @@ def load_dynamics(
         UnknownName: neither a model nor a folder has this name.
         BadCheckpoint: the folder holds no network that can be used, or one that was
             trained around another engine.
+        BadInput: identified parameters are damaged, or of another engine.
         MissingExtra: the engine needs a package that is not installed.
     """
     if name in PHYSICS:
@@ -48,6 +49,7 @@ def load_dynamics(
         return NamedDynamics(name, PhysicsDynamics(wrapped))
     folder = network_folder(name)
     if (folder / IDENTIFIED).is_file():
+        _check_identified(folder, engine)
         return NamedDynamics(folder.name, PhysicsDynamics(read_identified(folder)))
     network, card = load_network(folder)
     if engine is not None and not force:
@@ -73,6 +75,14 @@ def network_folder(name: str) -> Path:
             "of a trained network."
         )
     return folder
+
+
+def _check_identified(folder: Path, engine: str | None) -> None:
+    if engine not in (None, "planar"):
+        raise BadInput(
+            f"{folder / IDENTIFIED}: its parameters are those of the planar engine, "
+            f"not of {engine}; leave --engine out."
+        )
 
 
 def _check_engine(folder: Path, card: Card, engine: str) -> None:

@@ -90,7 +90,8 @@ class Task:
     def _split(self) -> tuple[int, np.ndarray]:
         """Return how many pushes are kept, and the random order of all."""
         pushes, share = self.store.info.pushes, self.config.validation_share
-        kept = max(round(share * pushes), 1) if share else 0
+        # At least one on either side.
+        kept = min(max(round(share * pushes), 1), pushes - 1) if share else 0
         rng = np.random.default_rng([_SPLIT, self.config.seed])
         return kept, rng.permutation(pushes)
 

@@ -87,8 +87,9 @@ def outcome(record: Record) -> str:
     pushes = "1 push" if record["pushes"] == 1 else f"{record['pushes']} pushes"
     if record["solved"]:
         return f"solved with {pushes}"
-    reason = "not at the goal" if record["reason"] == "solved" else record["reason"]
-    return f"{reason} after {pushes}"
+    # What follows a colon explains the reason: the record keeps it.
+    reason = record["reason"].partition(":")[0]
+    return f"{'not at the goal' if reason == 'solved' else reason} after {pushes}"
 
 
 def episode_data(record: Record) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Episodes of control in the manner of the paper's figure: start, goal and end."""
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from sainet.viz.episode_frames import outcome
 from sainet.viz.palette import INK, MOVED, OTHER, PUSHED, TARGET
 
 _ACROSS = 3  # panels
+_TITLE_WIDTH = 26  # characters; a longer title would push its panel out of the figure
+_MARGIN = 10  # mm about everything that is drawn
 
 Record = Mapping[str, Any]
 Place = Sequence[float] | np.ndarray  # mm
@@ -34,11 +37,23 @@ def draw_episodes(records: Sequence[Record], path: Path) -> Path:
     with house_look():
         figure = new_figure(0.4 + 2.9 * across, 0.3 + 2.6 * down)
         panels = figure.subplots(down, across, squeeze=False).ravel()
+        # All panels have one scale: an episode is not larger for being shorter.
+        low, high = _extent(records)
         for axes, record in zip(panels, records, strict=False):
             draw_episode(axes, record)
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         for axes in panels[len(records) :]:
             axes.set_axis_off()
         return save(figure, path)
+
+
+def _extent(records: Sequence[Record]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower left and the upper right corner of all that is drawn (mm)."""
+    places = [body_paths(record)[..., :2].reshape(-1, 2) for record in records]
+    goals = np.array([record["goal_mm"] for record in records])
+    every = np.concatenate([*places, goals])
+    reach = _MARGIN + max(max(record["radius_mm"]) for record in records)
+    return every.min(axis=0) - reach, every.max(axis=0) + reach
 
 
 def draw_episode(axes: Axes, record: Record) -> None:
@@ -53,9 +68,9 @@ def draw_episode(axes: Axes, record: Record) -> None:
     _disk(axes, record["goal_mm"], record["tolerance_mm"], facecolor=TARGET, zorder=4)
     end = path[-1, record["moved"], :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
-    axes.set_title(f"{outcome(record)}, {record['final_mm']:.1f} mm off")
+    said = textwrap.fill(outcome(record), _TITLE_WIDTH)
+    axes.set_title(f"{said}\n{record['final_mm']:.1f} mm off")
     axes.set_aspect("equal")
-    axes.autoscale_view()
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
 

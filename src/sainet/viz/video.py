@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from itertools import repeat
 from pathlib import Path
 
@@ -206,10 +207,10 @@ def _write_mp4(frames: Iterator[Frame], path: Path) -> None:
     writer = write_frames(
         str(path), _PIXELS, fps=FRAMES_PER_SECOND, output_params=["-f", "mp4"]
     )
-    with warnings.catch_warnings():
-        # JAX warns of every process that is started; FFmpeg does not use it.
-        warnings.filterwarnings("ignore", r"os\.fork", RuntimeWarning)
-        writer.send(None)
-    for frame in frames:
-        writer.send(np.ascontiguousarray(frame))
-    writer.close()
+    with closing(writer):
+        with warnings.catch_warnings():
+            # JAX warns of every process that is started; FFmpeg does not use it.
+            warnings.filterwarnings("ignore", r"os\.fork", RuntimeWarning)
+            writer.send(None)
+        for frame in frames:
+            writer.send(np.ascontiguousarray(frame))
