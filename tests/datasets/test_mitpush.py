@@ -38,11 +38,11 @@ def table(recorded_pushes_folder: Path) -> list[dict[str, str]]:
 @pytest.fixture
 def small(tmp_path: Path) -> Path:
     """A table of two made-up pushes, for what needs no recorded ones."""
-    names = "surface,shape,vel_mm_s,obj_x0,obj_y0,obj_th0,obj_x1,obj_y1,obj_th1,"
+    names = "surface,shape,s,t,vel_mm_s,obj_x0,obj_y0,obj_th0,obj_x1,obj_y1,obj_th1,"
     names += "tip_x0,tip_y0,tip_x1,tip_y1,zhou_poly4_x1,zhou_poly4_y1,zhou_poly4_th1"
     rows = [
-        "pu,ellip1,100,0.3,0,3.1,0.34,0,-3.1,0.2427,0,0.2927,0,0.35,0,-3.0",
-        "abs,ellip1,50,0.3,0,0,0.34,0,0.1,0.2427,0,0.2927,0,0.35,0,0.2",
+        "pu,ellip1,0.025,-0.349,100,0.3,0,3.1,0.34,0,-3.1,0.2427,0,0.2927,0,0.35,0,-3.0",
+        "abs,ellip1,0.5,0.000,50,0.3,0,0,0.34,0,0.1,0.2427,0,0.2927,0,0.35,0,0.2",
     ]
     folder = tmp_path / "in"
     folder.mkdir()
@@ -92,6 +92,17 @@ def test_every_push_is_there_in_its_group(recorded: Store):
     np.testing.assert_array_equal(
         arrays["steps"], np.where(arrays["group"] == 1, 600, 1200)
     )
+
+
+@pytest.mark.recorded
+def test_repeats_share_a_number(recorded: Store, table: list):
+    number = dict(zip(recorded.repeats().tolist(), table, strict=True))
+    assert len(number) == 600
+    plans = [tuple(row[name] for name in ("surface", "s", "t")) for row in table]
+    planned = [tuple(number[i][n] for n in ("surface", "s", "t")) for i in number]
+    assert len(set(planned)) == len(set(plans)) == 600
+    counts = Counter(recorded.repeats().tolist())
+    assert Counter(counts.values()) == {1: 395, 2: 205}
 
 
 @pytest.mark.recorded
@@ -187,7 +198,7 @@ def test_an_authors_log_gives_the_same_pushes(
     assert store.info.groups == ("plywood-10",)
     wanted, found = recorded.read(slice(None)), store.read(slice(None))
     same = wanted["group"] == GROUPS.index("plywood-10")
-    for name in wanted.keys() - {"group", "simulated_planar"}:
+    for name in wanted.keys() - {"group", "repeat", "simulated_planar"}:
         np.testing.assert_array_equal(found[name], wanted[name][same], err_msg=name)
     np.testing.assert_allclose(
         found["simulated_planar"], wanted["simulated_planar"][same], atol=1e-5

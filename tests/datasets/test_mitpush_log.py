@@ -13,7 +13,7 @@ from sainet.datasets.mitpush_mat import FIELDS
 from sainet.errors import BadTable
 
 ROW = {
-    **{"surface": "abs", "shape": "ellip1", "vel_mm_s": 10.0},
+    **{"surface": "abs", "shape": "ellip1", "vel_mm_s": 10.0, "s": 0.025, "t": -0.349},
     **{"obj_x0": 0.3, "obj_y0": 0.0, "obj_th0": 1.0},
     **{"obj_x1": 0.32, "obj_y1": 0.01, "obj_th1": 1.2},
     **{"tip_x0": 0.2427, "tip_y0": 0.0, "tip_x1": 0.2927, "tip_y1": 0.0},
@@ -56,6 +56,17 @@ def assert_same(one: EndpointLog, other: EndpointLog):
     assert one.surface == other.surface
     assert one.shape == other.shape
     assert one.model == other.model
+
+
+def test_a_table_says_which_pushes_were_meant_to_be_alike(tmp_path):
+    rows = [{}, {"t": 0.0}, {"vel_mm_s": 20.0}, {"surface": "plywood"}]
+    log = read_log(write_csv(tmp_path / "t.csv", *rows))
+    assert log.plan is not None
+    assert log.plan[0] == log.plan[2] == ("abs", 0.025, -0.349)
+    assert len(set(log.plan)) == 3
+    assert (
+        read_log(write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW])).plan is None
+    )
 
 
 def test_a_table_is_read_in_si_units(tmp_path: Path):

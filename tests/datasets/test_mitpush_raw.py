@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +109,13 @@ def test_the_store_is_like_any_other(imported):
     batch = to_batch(arrays, info, simulated="planar-calibrated")
     assert int(batch.pose_observed.sum()) == 260
     assert arrays["radius"] == pytest.approx(0.0525)
+
+
+def test_repeats_share_a_number(tmp_path: Path):
+    plans = [{"rep": 0}, {"t": 0.349}, {"rep": 1}, {"v": 60}]
+    files = {name(**plan): to_json(recording(0.2)) for plan in plans}
+    store = import_mitpush(pack(tmp_path / "a.zip", files), tmp_path / "out")
+    assert Counter(Counter(store.repeats().tolist()).values()) == {3: 1, 1: 1}
 
 
 def test_chunks_do_not_change_what_is_stored(

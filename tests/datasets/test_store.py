@@ -176,6 +176,15 @@ def test_content_changes_with_the_store(whole_store, copy):
     assert open_store(copy).content != before
 
 
+def test_who_says_nothing_of_repeats_has_none(copy):
+    def forget(found: dict) -> None:
+        del found["has_repeats"]
+
+    edit_attributes(copy, forget)
+    store = open_store(copy)
+    assert store.repeats().tolist() == list(range(store.info.pushes))
+
+
 def test_a_store_in_memory_is_written_and_read_back(tmp_path):
     info = StoreInfo(
         kind="robot",
@@ -187,6 +196,7 @@ def test_a_store_in_memory_is_written_and_read_back(tmp_path):
         engine="recorded",
         groups=("abs-10", "größer"),
         published=("convex",),
+        has_repeats=True,
     )
     rng = np.random.default_rng(0)
     sizes = {"push": 5, "time": 4, "body": 1, "motion": 6, "pose": 3, "xy": 2}

@@ -7,10 +7,15 @@ import numpy as np
 import pytest
 
 from sainet.datasets.batch import to_batch
+from sainet.engines.identified import beliefs_of, identified_engine
 from sainet.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
+from sainet.models.registry import load_dynamics
+from sainet.runs import write_json
+from sainet.scene import pack_motion
 from sainet.training import fit as fit_module
+from sainet.training.assumed import find_assumed_engine
 from sainet.training.best import Best
 from sainet.training.config import FINE_TUNING, FitConfig
 from sainet.training.fit import fit
@@ -18,6 +23,7 @@ from sainet.training.statistics import loss_weights
 from sainet.training.task import Start, Task, begin
 from training.stores import end_points_alone, info_of, made_up, write
 
+PLANAR = find_assumed_engine("planar")
 BEFORE = FitConfig(iterations=3, batch_size=4, steps=12, log_every=1)
 TUNING = replace(
     FINE_TUNING, iterations=8, batch_size=4, log_every=1, checkpoint_every=2, patience=0
@@ -51,7 +57,7 @@ def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
     card, before = read_card(out), read_card(start / "sain")
     assert card.started_from == before.weights
     assert (card.truth_engine, card.features) == ("recorded", "paper")
-    task = Task("sain", store, TUNING, "planar", load(start / "sain"))
+    task = Task("sain", store, TUNING, PLANAR, load(start / "sain"))
     first = begin(task)[0].network
     for found, known in zip(
         jax.tree.leaves(first), layers(start / "sain"), strict=True
@@ -127,18 +133,55 @@ def test_an_interrupted_tuning_ends_in_the_same_network(store, start, tmp_path):
 
 
 def test_validation_pushes_are_drawn_at_random_and_not_trained_on(store):
-    task = Task("in", store, TUNING, "planar")
+    task = Task("in", store, TUNING, PLANAR)
     training, validation = set(task.training.rows), set(task.validation.rows)
     assert (len(training), len(validation)) == (16, 4)
     assert training | validation == set(range(20))
-    other = Task("in", store, replace(TUNING, seed=1), "planar")
+    other = Task("in", store, replace(TUNING, seed=1), PLANAR)
     assert set(other.validation.rows) != validation
     assert validation != set(range(16, 20))
     for share in (0.01, 0.99):  # of two pushes, one remains on either side
         few = Task(
-            "in", store.first(2), replace(TUNING, validation_share=share), "planar"
+            "in", store.first(2), replace(TUNING, validation_share=share), PLANAR
         )
         assert (len(few.training.rows), len(few.validation.rows)) == (1, 1)
+
+
+def test_repeats_are_validated_on_together_or_not_at_all(tmp_path):
+    info = info_of(40, engine="recorded", seed=None, has_repeats=True)
+    repeat = np.random.default_rng(0).permutation(np.repeat(np.arange(8), 5))
+    arrays = end_points_alone(made_up(info)) | {"repeat": repeat}
+    task = Task("in", write(tmp_path / "data", info, arrays), TUNING, PLANAR)
+    assert task.training.info.pushes + task.validation.info.pushes == 40
+    assert not set(task.training.repeats()) & set(task.validation.repeats())
+    assert task.validation.info.pushes in (5, 10)  # 8 of them would cut a kind
+
+
+def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
+    """Its prediction is computed: the store has none, and the card says it all."""
+    values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5}
+    write_json(tmp_path / "engine" / "identified.json", {"values": values})
+    words = {"assumed_engine": str(tmp_path / "engine")}
+    out = tmp_path / "out"
+    fit("sain", store, TUNING, out, start_from=str(start / "sain"), **words)
+    card = read_card(out)
+    assert card.inner_engine == "identified"
+    assert card.assumed == beliefs_of(values)
+    dynamics = load_dynamics(str(out)).dynamics
+    assert dynamics.engine == identified_engine(values)
+    fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
+    with pytest.raises(BadCheckpoint, match="inner_engine is 'identified'"):
+        fit("sain", store, TUNING, tmp_path / "no", start_from=str(out))
+    task = Task("sain", store, TUNING, find_assumed_engine(str(tmp_path / "engine")))
+    arrays = store.read(slice(0, 4), task.names)
+    assert "simulated_planar" not in arrays
+    batch = task.to_batch(arrays, 12)
+    wanted = identified_engine(values).rollout(
+        batch.scene, batch.initial, batch.controls
+    )
+    np.testing.assert_allclose(
+        batch.simulated, pack_motion(wanted.states), rtol=1e-4, atol=1e-6
+    )
 
 
 def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):

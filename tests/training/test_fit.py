@@ -18,6 +18,7 @@ from sainet.models.registry import load_dynamics
 from sainet.runs import MANIFEST, content_hash
 from sainet.scene import pack_motion
 from sainet.training import fit as fit_module
+from sainet.training.assumed import find_assumed_engine
 from sainet.training.batch import predict_batch
 from sainet.training.config import FitConfig
 from sainet.training.fit import STATE, fit
@@ -31,6 +32,7 @@ from training.stores import (
     write,
 )
 
+PLANAR = find_assumed_engine("planar")
 CONFIG = FitConfig(
     iterations=60,
     batch_size=8,
@@ -138,7 +140,7 @@ def test_pushes_with_known_ends_alone_can_be_trained_on(tmp_path):
     result = fit("in", store, config, tmp_path / "out")
     found = losses(result, "loss")
     assert np.isfinite(found).all()
-    state, weights = begin(Task("in", store, config, "planar"))
+    state, weights = begin(Task("in", store, config, PLANAR))
     after, before = load_network(tmp_path / "out")[0].dyn, state.network.dyn
     moved = jax.tree.map(lambda a, b: float(abs(a - b).max()), after, before)
     assert min(jax.tree.leaves(moved)) > 1e-4  # no step was skipped as not finite
@@ -158,7 +160,7 @@ def never_learns(loss):
 
 
 def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch):
-    task = Task("sain", store, CONFIG, "planar")
+    task = Task("sain", store, CONFIG, PLANAR)
     chunk = sum(a.nbytes for a in store.read(slice(0, 8), task.names).values())
     readers = []
     reader = fit_module.BatchReader
@@ -218,7 +220,7 @@ def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
 
 
 def test_some_pushes_have_to_remain_for_training(store, tmp_path):
-    with pytest.raises(BadInput, match="--validation-share is 0.1.*only 1 push"):
+    with pytest.raises(BadInput, match="--validation-share is 0.1.*no two pushes"):
         fit("sain", store.first(1), CONFIG, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

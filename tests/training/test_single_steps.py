@@ -17,12 +17,14 @@ from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
 from sainet.models.registry import load_dynamics
 from sainet.models.restarted import Restarted
 from sainet.scene import pack_motion
+from sainet.training.assumed import find_assumed_engine
 from sainet.training.config import FitConfig
 from sainet.training.fit import fit
 from sainet.training.single_steps import to_single_steps
 from sainet.training.task import Task, settings
 from training.stores import info_of, made_up, quiet_store, write
 
+PLANAR = find_assumed_engine("planar")
 CONFIG = FitConfig(
     iterations=60, batch_size=8, log_every=5, learning_rate=3e-3, recurrent=False
 )
@@ -118,8 +120,8 @@ def test_a_trained_network_says_that_it_is_of_single_steps(trained):
 
 def test_folders_from_before_this_setting_still_resume(store):
     plain = replace(CONFIG, recurrent=True)
-    assert "recurrent" not in settings(Task("in", store, plain, "planar"))
-    assert settings(Task("in", store, CONFIG, "planar"))["recurrent"] is False
+    assert "recurrent" not in settings(Task("in", store, plain, PLANAR))
+    assert settings(Task("in", store, CONFIG, PLANAR))["recurrent"] is False
 
 
 def test_what_cannot_be_cut_is_refused(store, tmp_path):

@@ -24,7 +24,8 @@ class Train:
     out: Path
     """Run folder to write; the same settings go on where they stopped."""
     assumed_engine: str = "planar"
-    """Engine whose stored prediction SAIN corrects, by the name in the dataset."""
+    """Engine whose prediction SAIN corrects: by its name in the dataset, or the folder
+    that `sainet identify` wrote."""
     start_from: str | None = None
     """Network to go on from: a shipped one or the folder of a trained one. Other
     defaults hold then, for few recorded pushes: 'sainet train --start-from sain --help'

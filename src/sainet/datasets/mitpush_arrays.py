@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.mitpush_log import EndpointLog
-from sainet.datasets.recorded import simulate
+from sainet.datasets.recorded import numbered, simulate
 from sainet.datasets.schema import StoreInfo, published_name, simulated_name
 from sainet.scene import TIME_STEP
 
@@ -29,6 +29,7 @@ def store_info(log: EndpointLog) -> StoreInfo:
         assumed_engines=(ASSUMED_ENGINE,),
         groups=tuple(sorted(set(_groups(log)))),
         published=(log.model,),
+        has_repeats=log.plan is not None,
     )
 
 
@@ -73,6 +74,8 @@ def to_arrays(
         k: v.astype(np.float32) if v.dtype == float else v for k, v in arrays.items()
     }
     arrays["truth_pusher"] = arrays["command_position"]
+    if log.plan is not None:
+        arrays["repeat"] = numbered(log.plan)
     return arrays | {
         simulated_name(ASSUMED_ENGINE): simulate(ASSUMED_ENGINE, arrays, info)
     }

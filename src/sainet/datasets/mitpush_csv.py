@@ -11,6 +11,7 @@ from sainet.errors import BadTable
 _log = logging.getLogger(__name__)
 
 TEXT = ("surface", "shape")
+PLAN = ("s", "t")  # contact and direction of a push as it was planned
 NUMBERS = (
     *("vel_mm_s", "obj_x0", "obj_y0", "obj_th0", "obj_x1", "obj_y1", "obj_th1"),
     *("tip_x0", "tip_y0", "tip_x1", "tip_y1"),
@@ -47,7 +48,7 @@ def read_csv(path: Path, data: bytes) -> tuple[list[str], list[Row]]:
 
 
 def _check_header(path: Path, header: list[str]) -> None:
-    for name in (*TEXT, *NUMBERS):
+    for name in (*TEXT, *PLAN, *NUMBERS):
         if header.count(name) != 1:
             found = "missing" if name not in header else "there twice"
             raise BadTable(
@@ -66,7 +67,9 @@ def _rows(
                 "header has; it is cut or broken: repair or remove it."
             )
         text = dict(zip(header, fields, strict=True))
-        numbers = {name: _number(path, place, name, text[name]) for name in NUMBERS}
+        numbers = {
+            name: _number(path, place, name, text[name]) for name in (*PLAN, *NUMBERS)
+        }
         yield {name: text[name].strip() for name in TEXT} | numbers
 
 

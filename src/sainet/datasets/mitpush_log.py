@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.mitpush_csv import Row, read_csv
+from sainet.datasets.mitpush_csv import PLAN, Row, read_csv
 from sainet.datasets.mitpush_mat import read_mat
 from sainet.errors import BadTable
 
@@ -35,6 +35,7 @@ class EndpointLog:
     tip_after: Float[np.ndarray, "push 2"]  # m
     published: Float[np.ndarray, "push 3"]  # m, m, rad: end by a published model
     model: str  # name of that model
+    plan: tuple[tuple[str | float, ...], ...] | None  # alike of repeats, if known
 
     @property
     def size(self) -> int:
@@ -108,7 +109,15 @@ def _to_log(path: Path, places: list[str], rows: list[Row], model: str) -> Endpo
         tip_after=columns("tip_x1", "tip_y1"),
         published=columns("zhou_poly4_x1", "zhou_poly4_y1", "zhou_poly4_th1"),
         model=f"zhou-{model}",
+        plan=_plan(rows),
     )
+
+
+def _plan(rows: list[Row]) -> tuple[tuple[str | float, ...], ...] | None:
+    """Return surface, contact and direction as planned; a .mat log says neither."""
+    if not all(name in row for row in rows for name in PLAN):
+        return None
+    return tuple(tuple(row[name] for name in ("surface", *PLAN)) for row in rows)
 
 
 def _check_rows(path: Path, places: list[str], rows: list[Row]) -> None:

@@ -17,8 +17,8 @@ SMALLEST = 100  # bytes: files below are the remains of recordings that failed
 ENDINGS = (".json", ".h5")  # of the same push, the first is taken
 _NAME = re.compile(
     r"motion_surface=(?P<surface>[A-Za-z0-9.-]+)_shape=(?P<shape>[A-Za-z0-9.-]+)"
-    r"_a=(?P<acceleration>-?\d{1,6})_v=(?P<speed>-?\d{1,6})_i=-?\d+\.\d{3}"
-    r"_s=-?\d+\.\d{3}_t=-?\d+\.\d{3}(_rep=\d{4,})?\.(h5|json)",
+    r"_a=(?P<acceleration>-?\d{1,6})_v=(?P<speed>-?\d{1,6})"
+    r"_(?P<place>i=-?\d+\.\d{3}_s=-?\d+\.\d{3}_t=-?\d+\.\d{3})(_rep=\d{4,})?\.(h5|json)",
     re.ASCII,
 )
 
@@ -32,6 +32,7 @@ class MotionFile:
     shape: str
     acceleration: int  # mm/s^2
     speed: int  # mm/s; -1 of a push that accelerates
+    plan: str  # surface, side, contact and direction: alike of repeats
 
     @property
     def push(self) -> str:
@@ -78,6 +79,7 @@ def _parse(file: ArchivedFile) -> MotionFile | None:
         shape=match["shape"],
         acceleration=int(match["acceleration"]),
         speed=int(match["speed"]),
+        plan=f"{match['surface']}_{match['place']}",
     )
 
 

@@ -2,6 +2,7 @@
 
 import logging
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,8 @@ def _read(
     for motion, (file, data) in zip(motions, contents, strict=True):
         hashes[file.name] = content_hash(data)
         try:
-            pushes.append(read_motion(file.name, data, motion.group))
+            push = read_motion(file.name, data, motion.group)
+            pushes.append(replace(push, plan=motion.plan))
         except Unusable as reason:
             skipped[str(reason)] += 1
             _log.warning("%s is left out: %s", file, reason)

@@ -4,13 +4,13 @@ import logging
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
 from sainet.datasets.schema import StoreInfo
@@ -82,6 +82,12 @@ def simulate(
         push = int(np.argmin(np.isfinite(motion).all((1, 2, 3))))
         raise Diverged(f"{name} left the numbers in push {push}.")
     return motion
+
+
+def numbered(plans: Sequence[Hashable]) -> Int[np.ndarray, " push"]:
+    """Return a number for each push: equal plans share it, the first one's is 0."""
+    known = {plan: number for number, plan in enumerate(dict.fromkeys(plans))}
+    return np.array([known[plan] for plan in plans], np.int32)
 
 
 def _is_finished(out: Path, config: dict[str, Any]) -> bool:

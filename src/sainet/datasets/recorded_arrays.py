@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sainet.datasets.recorded import simulate
+from sainet.datasets.recorded import numbered, simulate
 from sainet.datasets.recorded_push import RecordedPush
 from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk
@@ -64,12 +64,16 @@ def write_pushes(
     """
     info = store_info(pushes)
     create_arrays(folder, info)
+    repeats = numbered([push.plan for push in pushes])
     for index in range(info.chunks):
         part = pushes[info.chunk_slice(index)]
         # Always a whole chunk, so that the last one compiles nothing of its own.
         whole = [part[i % len(part)] for i in range(min(info.chunk_size, info.pushes))]
         arrays = chunk_arrays(whole, scene, info)
-        write_chunk(folder, info, index, {k: v[: len(part)] for k, v in arrays.items()})
+        known = {name: array[: len(part)] for name, array in arrays.items()}
+        if info.has_repeats:
+            known["repeat"] = repeats[info.chunk_slice(index)]
+        write_chunk(folder, info, index, known)
     finish(folder, info)
 
 
@@ -88,6 +92,7 @@ def store_info(pushes: Sequence[RecordedPush]) -> StoreInfo:
         engine="recorded",
         assumed_engines=ASSUMED_ENGINES,
         groups=tuple(sorted(named)),
+        has_repeats=all(push.plan for push in pushes),
     )
 
 

@@ -27,6 +27,7 @@ class StoreInfo:
     has_measurements: bool = False  # apart from the truth
     groups: tuple[str, ...] = ()  # names of the codes in `group`
     published: tuple[str, ...] = ()  # models whose published predictions are kept
+    has_repeats: bool = False  # known which pushes were meant to be alike
     seed: int | None = None
     pusher_mass: float = 10.0  # kg (direct force)
     damping: float = 1000.0  # N s/m (direct force)
@@ -97,6 +98,10 @@ def variables(info: StoreInfo) -> dict[str, Variable]:
     if info.has_measurements:
         found["measured"] = Variable(
             ("push", "time", "body", "pose"), "m m rad", "pose as it was captured"
+        )
+    if info.has_repeats:
+        found["repeat"] = Variable(
+            ("push",), "1", "pushes that were meant to be alike share it", np.int32
         )
     for engine in info.assumed_engines:
         found[simulated_name(engine)] = Variable(

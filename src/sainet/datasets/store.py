@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
+from jaxtyping import Int
 
 from sainet.datasets.schema import FORMAT_VERSION, Kind, StoreInfo, sizes, variables
 from sainet.datasets.writer import ARRAYS, HASHES, chunk_files
@@ -65,6 +66,15 @@ class Store:
             raise BadInput(f"{self.path} has no group {name!r}; it has {known}.")
         groups = self.read(slice(None), ("group",))["group"]
         return self.take(np.flatnonzero(groups == self.info.groups.index(name)))
+
+    def repeats(self) -> Int[np.ndarray, " push"]:
+        """Return a number for each push; those that were meant to be alike share it.
+
+        Where nobody said which are, no two do.
+        """
+        if not self.info.has_repeats:
+            return np.arange(self.info.pushes)
+        return self.read(slice(None), ("repeat",))["repeat"]
 
     @cached_property
     def _group(self) -> Any:  # noqa: ANN401
@@ -172,8 +182,11 @@ def _are_names(value: object) -> bool:
     return isinstance(value, list) and all(isinstance(name, str) for name in value)
 
 
+# Attributes that came later: what a store from before, which lacks them, means.
+_LATER = {"has_repeats": False}
 _SENSE: dict[str, Callable[[object], bool]] = {
     "kind": lambda value: value in get_args(Kind),
+    "has_repeats": lambda value: isinstance(value, bool),
     **dict.fromkeys(("pushes", "bodies", "steps", "chunk_size"), _is_count),
     **dict.fromkeys(("time_step", "pusher_mass", "damping"), _is_positive),
     **dict.fromkeys(("assumed_engines", "groups", "published"), _are_names),
@@ -185,6 +198,7 @@ def _read_info(folder: Path) -> StoreInfo:
     attributes = read_json(path, BadStore).get("attributes", {})
     _check_version(path, attributes)
     names = {field.name for field in fields(StoreInfo)}
+    attributes = _LATER | attributes
     missing = sorted(names - attributes.keys())
     if missing:
         raise BadStore(f"{path}: {missing[0]} is missing; make the dataset again.")

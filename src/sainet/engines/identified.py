@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
@@ -10,6 +11,7 @@ from sainet.errors import BadInput
 from sainet.runs import read_json
 
 FILE = "identified.json"
+IDENTIFIED = "identified"  # the name of such an engine on a network's card
 FRICTIONS = ("pusher_friction", "disk_friction", "table_friction")
 RATIO = "pressure_radius_ratio"
 NAMES = (*FRICTIONS, RATIO)
@@ -21,18 +23,54 @@ def identified_engine(values: Mapping[str, float]) -> AssumedProperties:
 
     Masses and radii are the scene's own.
     """
+    return engine_of_beliefs(beliefs_of(values))
+
+
+def beliefs_of(values: Mapping[str, float]) -> dict[str, Any]:
+    """Return what the engine believes, as a network's card says it; None is the truth.
+
+    Args:
+        values: identified ones by their names.
+    """
+    return {
+        "mass": None,
+        "radius": None,
+        "friction": values.get("table_friction"),
+        "pusher_friction": values.get("pusher_friction"),
+        "disk_friction": values.get("disk_friction"),
+        RATIO: values.get(RATIO),
+    }
+
+
+def engine_of_beliefs(beliefs: Mapping[str, Any]) -> AssumedProperties:
+    """Return the engine that believes so: what `beliefs_of` returns."""
+    ratio = beliefs.get(RATIO)
     return AssumedProperties(
-        PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO)),
+        PlanarEngine(pressure_radius_ratio=USUAL_RATIO if ratio is None else ratio),
         mass=None,
         radius=None,
-        friction=values.get("table_friction"),
-        pusher_friction=values.get("pusher_friction"),
-        disk_friction=values.get("disk_friction"),
+        friction=beliefs.get("friction"),
+        pusher_friction=beliefs.get("pusher_friction"),
+        disk_friction=beliefs.get("disk_friction"),
     )
+
+
+def is_identified(folder: Path) -> bool:
+    """Return whether `sainet identify` left an engine in a folder."""
+    return (folder / FILE).is_file()
 
 
 def read_identified(folder: Path) -> AssumedProperties:
     """Return the engine that `sainet identify` left in a folder.
+
+    Raises:
+        BadInput: the file is damaged or holds no such values.
+    """
+    return identified_engine(read_values(folder))
+
+
+def read_values(folder: Path) -> dict[str, float]:
+    """Return the values that `sainet identify` left in a folder, by their names.
 
     Raises:
         BadInput: the file is damaged or holds no such values.
@@ -48,4 +86,4 @@ def read_identified(folder: Path) -> AssumedProperties:
                 f"{path}: values.{name} is {value!r}; it must be a positive number "
                 f"for one of {', '.join(NAMES)}. Run 'sainet identify' again."
             )
-    return identified_engine(values)
+    return values

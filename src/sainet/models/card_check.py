@@ -61,6 +61,11 @@ _ASSUMED: dict[str, _Check] = {
         _or_none(lambda v: _is_number(v) and v >= 0),
         "a number from 0 up or null",
     ),
+    **dict.fromkeys(
+        # Of an engine that was identified.
+        ("pusher_friction", "disk_friction", "pressure_radius_ratio"),
+        (_or_none(lambda v: _is_number(v) and v > 0), "a positive number or null"),
+    ),
 }
 
 

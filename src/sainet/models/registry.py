@@ -4,8 +4,13 @@ from pathlib import Path
 
 from sainet.engines import ASSUMED_ENGINES, CALIBRATED, make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
-from sainet.engines.identified import FILE as IDENTIFIED
-from sainet.engines.identified import read_identified
+from sainet.engines.identified import (
+    FILE,
+    IDENTIFIED,
+    engine_of_beliefs,
+    is_identified,
+    read_identified,
+)
 from sainet.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.models.card import CARD, Card
 from sainet.models.checkpoint import load_network
@@ -48,7 +53,7 @@ def load_dynamics(
         wrapped = PHYSICS[name](make_engine(engine or "planar"))
         return NamedDynamics(name, PhysicsDynamics(wrapped))
     folder = network_folder(name)
-    if (folder / IDENTIFIED).is_file():
+    if is_identified(folder):
         _check_identified(folder, engine)
         return NamedDynamics(folder.name, PhysicsDynamics(read_identified(folder)))
     network, card = load_network(folder)
@@ -80,31 +85,39 @@ def network_folder(name: str) -> Path:
 def _check_identified(folder: Path, engine: str | None) -> None:
     if engine not in (None, "planar"):
         raise BadInput(
-            f"{folder / IDENTIFIED}: its parameters are those of the planar engine, "
+            f"{folder / FILE}: its parameters are those of the planar engine, "
             f"not of {engine}; leave --engine out."
         )
 
 
 def _check_engine(folder: Path, card: Card, engine: str) -> None:
     own = card.inner_engine
-    if own is not None and own.removesuffix(CALIBRATED) != engine:
+    if own is not None and _made_of(own) != engine:
         raise BadCheckpoint(
             f"{folder / CARD}: inner_engine is {own!r}, not {engine!r}; leave --engine "
             "out, train a network around that engine, or give --force."
         )
 
 
+def _made_of(inner_engine: str) -> str:
+    """Return the engine that an assumed one is made of."""
+    if inner_engine == IDENTIFIED:
+        return "planar"
+    return inner_engine.removesuffix(CALIBRATED)
+
+
 def _inner_engine(folder: Path, card: Card, engine: str | None) -> AssumedProperties:
     """Return the engine with what the network was trained to believe of the scene."""
-    own = card.inner_engine
-    if own not in ASSUMED_ENGINES:
+    own, assumed = card.inner_engine, card.assumed or {}
+    if own == IDENTIFIED and engine in (None, "planar"):
+        return engine_of_beliefs(assumed)
+    if own not in (*ASSUMED_ENGINES, IDENTIFIED):
         raise BadCheckpoint(
             f"{folder / CARD}: inner_engine is {own!r}; this sainet has "
             f"{', '.join(sorted(ASSUMED_ENGINES))}."
         )
-    assumed = card.assumed or {}
     return AssumedProperties(
-        make_engine(engine or own.removesuffix(CALIBRATED)),
+        make_engine(engine or _made_of(own)),
         mass=_tuple(assumed.get("mass")),
         radius=_tuple(assumed.get("radius")),
         friction=assumed.get("friction"),

@@ -14,7 +14,6 @@ from jaxtyping import Array
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
-from sainet.engines.assumed import beliefs
 from sainet.errors import Diverged
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
@@ -30,6 +29,7 @@ from sainet.runs import (
     read_json,
     write_json,
 )
+from sainet.training.assumed import find_assumed_engine
 from sainet.training.best import Best
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.log import append_log, read_log, rewind_log
@@ -68,7 +68,8 @@ def fit(
         store: training data.
         config: of the training.
         out: the run folder.
-        assumed_engine: whose stored prediction SAIN sees.
+        assumed_engine: whose prediction SAIN sees: by its name in the store, or the
+            folder of an identified engine, which then predicts as it is needed.
         start_from: the network to go on from, by its name or folder; None draws one.
         on_step: told the finished iterations and the loss that was last logged.
 
@@ -78,7 +79,8 @@ def fit(
         BadCheckpoint: training cannot go on from that network.
         Diverged: the loss left the finite numbers for good.
     """
-    task = Task(model, store, config, assumed_engine, _start(start_from))
+    assumed = find_assumed_engine(assumed_engine)
+    task = Task(model, store, config, assumed, _start(start_from))
     check_data(task)
     devices = jax.device_count()
     folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
@@ -208,9 +210,9 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         model=task.model,
         kind=info.kind,
         time_step=info.time_step,
-        inner_engine=task.assumed_engine if sain else None,
+        inner_engine=task.assumed.name if sain else None,
         truth_engine=info.engine,
-        assumed=beliefs(task.assumed_engine) if sain else None,
+        assumed=task.assumed.beliefs if sain else None,
         data=task.store.content,
         data_seed=info.seed,
         weights=content_hash(data),

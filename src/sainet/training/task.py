@@ -11,20 +11,22 @@ import numpy as np
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import simulated_name, variables
 from sainet.datasets.store import Store
-from sainet.engines import make_assumed_engine
+from sainet.engines.identified import IDENTIFIED
 from sainet.errors import BadCheckpoint, BadInput, BadStore
 from sainet.models.card import CARD, Card
 from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork, Scales
 from sainet.models.widen import widen
+from sainet.training.assumed import AssumedEngine
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.loss import LossWeights
 from sainet.training.single_steps import to_single_steps
+from sainet.training.split import split
 from sainet.training.statistics import feature_scales, loss_weights
 from sainet.training.step import FitState, first_state
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
-_SPLIT = 0x5B117
+_PLANAR = "planar"  # what an identified engine is with other numbers
 _ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
 # Settings that came later: a folder from before, which lacks them, had these.
 _LATER = {
@@ -52,13 +54,13 @@ class Task:
     model: ModelKind
     store: Store
     config: FitConfig
-    assumed_engine: str
+    assumed: AssumedEngine
     start: Start | None = None  # None: weights are drawn
 
     @property
-    def simulated(self) -> str | None:
+    def inner(self) -> AssumedEngine | None:
         """The assumed engine whose prediction the network sees."""
-        return self.assumed_engine if self.model == "sain" else None
+        return self.assumed if self.model == "sain" else None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -66,7 +68,9 @@ class Task:
         unread = ("truth_pusher", "group", "published")
         skip = lambda name: name.startswith(("simulated_", *unread))  # noqa: E731
         kept = [name for name in variables(self.store.info) if not skip(name)]
-        return (*kept, simulated_name(self.assumed_engine))
+        if not self.assumed.is_stored:
+            return tuple(kept)
+        return (*kept, simulated_name(self.assumed.name))
 
     @property
     def sizes(self) -> FeatureSizes:
@@ -77,61 +81,65 @@ class Task:
     @cached_property
     def training(self) -> Store:
         """The pushes that are trained on."""
-        kept, order = self._split
-        return self.store.take(order[kept:]) if kept else self.store
+        return self.store.take(self._split[0]) if self.validation else self.store
 
     @cached_property
     def validation(self) -> Store | None:
         """The pushes that are kept for validation, if any."""
-        kept, order = self._split
-        return self.store.take(order[:kept]) if kept else None
+        kept = self._split[1]
+        return self.store.take(kept) if len(kept) else None
 
-    @property
-    def _split(self) -> tuple[int, np.ndarray]:
-        """Return how many pushes are kept, and the random order of all."""
-        pushes, share = self.store.info.pushes, self.config.validation_share
-        # At least one on either side.
-        kept = min(max(round(share * pushes), 1), pushes - 1) if share else 0
-        rng = np.random.default_rng([_SPLIT, self.config.seed])
-        return kept, rng.permutation(pushes)
+    @cached_property
+    def _split(self) -> tuple[np.ndarray, np.ndarray]:
+        config = self.config
+        return split(self.store.repeats(), config.validation_share, config.seed)
 
     def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
         """Turn stored arrays into a batch with what the network sees."""
-        return self._batch(arrays, steps, self.simulated)
+        return self._batch(arrays, steps, self.inner)
 
     def to_sample(self, arrays: dict[str, np.ndarray]) -> PushBatch:
         """Return what statistics are of: s-bar stands in for an unknown truth."""
-        return self._batch(arrays, self.store.info.steps, self.assumed_engine)
+        return self._batch(arrays, self.store.info.steps, self.assumed)
 
     def _batch(
-        self, arrays: dict[str, np.ndarray], steps: int, simulated: str | None
+        self, arrays: dict[str, np.ndarray], steps: int, inner: AssumedEngine | None
     ) -> PushBatch:
         steps = min(steps, self.config.steps)
-        batch = to_batch(arrays, self.store.info, steps=steps, simulated=simulated)
-        if self.config.recurrent:
-            return batch
-        return to_single_steps(
-            batch, make_assumed_engine(simulated) if simulated else None
-        )
+        stored = inner.name if inner and inner.is_stored else None
+        batch = to_batch(arrays, self.store.info, steps=steps, simulated=stored)
+        if not self.config.recurrent:
+            return to_single_steps(batch, inner.make() if inner else None)
+        return inner.predict(batch) if inner and not inner.is_stored else batch
 
 
 def check_data(task: Task) -> None:
     """Raise `BadStore` or `BadInput` if the data lack what training needs."""
-    info, path = task.store.info, task.store.path
-    if task.assumed_engine not in info.assumed_engines:
-        raise BadStore(
-            f"{path}: assumed_engines has no {task.assumed_engine!r}; generate the "
-            f"data with --assumed-engine {task.assumed_engine}."
-        )
-    if task.config.validation_share and info.pushes < 2:  # noqa: PLR2004
+    path = task.store.path
+    _check_assumed(task)
+    if task.config.validation_share and task.validation is None:
         raise BadInput(
-            f"--validation-share is {task.config.validation_share}; {path} has only "
-            f"{info.pushes} push."
+            f"--validation-share is {task.config.validation_share}; {path} has no two "
+            "pushes that are not repeats of each other."
         )
     if task.start:
         _check_start(task, task.start)
     if not task.config.recurrent:
         _check_single_steps(task)
+
+
+def _check_assumed(task: Task) -> None:
+    info, path, name = task.store.info, task.store.path, task.assumed.name
+    if task.assumed.is_stored and name not in info.assumed_engines:
+        raise BadStore(
+            f"{path}: assumed_engines has no {name!r}; generate the data with "
+            f"--assumed-engine {name}, or give the folder of an identified engine."
+        )
+    if not task.assumed.is_stored and info.kind != "robot":
+        raise BadStore(
+            f"{path}: kind is {info.kind!r}; an identified engine predicts pushes of "
+            "the robot setup."
+        )
 
 
 def _check_start(task: Task, start: Start) -> None:
@@ -141,7 +149,6 @@ def _check_start(task: Task, start: Start) -> None:
         "model": task.model,
         "kind": info.kind,
         "time_step": info.time_step,
-        "inner_engine": task.simulated,
         "recurrent": task.config.recurrent,
     }
     for name, value in wanted.items():
@@ -151,9 +158,25 @@ def _check_start(task: Task, start: Start) -> None:
                 f"{start.folder / CARD}: {name} is {found!r}, this training's is "
                 f"{value!r}; give --start-from another network."
             )
+    _check_inner_engine(task, start)
     if card.features == "place" and task.config.features == "paper":
         raise BadCheckpoint(
             f"{start.folder / CARD}: features is 'place'; give --features place, too."
+        )
+
+
+def _check_inner_engine(task: Task, start: Start) -> None:
+    """Raise `BadCheckpoint` if what the network was trained around is too different.
+
+    An identified engine is the planar one with other numbers: a network that was
+    trained around that goes on from there.
+    """
+    found, wanted = start.card.inner_engine, task.inner.name if task.inner else None
+    alike = (_PLANAR, IDENTIFIED)
+    if found != wanted and not (wanted == IDENTIFIED and found in alike):
+        raise BadCheckpoint(
+            f"{start.folder / CARD}: inner_engine is {found!r}, this training's is "
+            f"{wanted!r}; give --start-from another network."
         )
 
 
@@ -164,9 +187,9 @@ def _check_single_steps(task: Task) -> None:
             f"{path}: --no-recurrent needs simulated pushes of the robot setup, whose "
             "state is known at every step; leave it out."
         )
-    if task.simulated and make_assumed_engine(task.simulated).on_host:
+    if task.inner and task.inner.make().on_host:
         raise BadInput(
-            f"--assumed-engine {task.simulated} cannot restart at every step of a "
+            f"--assumed-engine {task.inner.name} cannot restart at every step of a "
             "training; take planar, or leave --no-recurrent out."
         )
 
@@ -180,10 +203,12 @@ def settings(task: Task) -> dict[str, Any]:
         if config[name] == before:
             del config[name]
     start = {"start_from": task.start.card.weights} if task.start else {}
+    computed = {} if task.assumed.is_stored else {"assumed": task.assumed.beliefs}
     return {
         "command": "train",
         "model": task.model,
-        "assumed_engine": task.assumed_engine,
+        "assumed_engine": task.assumed.name,
+        **computed,
         "data": task.store.content,
         **start,
         **config,
