@@ -2,8 +2,9 @@
 
     python tools/pretrained.py [--scale paper] [--out runs/results] [--into FOLDER]
 
-They are seed 0 of Table III (`sainet reproduce robot-two-disks`): what that has
-trained already, or trains later, is the same folder and is not trained again.
+The paper's are seed 0 of Table III (`sainet reproduce robot-two-disks`): what that has
+trained already, or trains later, is the same folder and is not trained again. Those of
+strokes go on from the paper's, as they are shipped.
 """
 
 import argparse
@@ -18,7 +19,9 @@ from sainet.cli.progress import progress_bar
 from sainet.processes import worker_pool
 
 if TYPE_CHECKING:
+    from sainet.experiments.chain import Chain
     from sainet.experiments.paper_setup import PaperSetup
+    from sainet.experiments.strokes import StrokeSetup
     from sainet.models.card import Card
 
 SEED = 0
@@ -35,29 +38,44 @@ def main() -> None:
     use_devices(options.devices)
     from sainet.experiments.chain import Chain
     from sainet.experiments.paper_setup import paper_setup
+    from sainet.experiments.strokes import stroke_setup
     from sainet.models.registry import PRETRAINED
 
     output = Output()
     with worker_pool(None) as pool:
         bar = partial(progress_bar, output=output)
         chain = Chain(options.out / "pretrained", pool, output.say, bar)
-        setup = paper_setup("robot", options.scale, chain)
-        build(setup, options.into or PRETRAINED)
+        into = options.into or PRETRAINED
+        build(paper_setup("robot", options.scale, chain), into)
+        build_strokes(stroke_setup(options.scale, chain), into)
 
 
 def build(setup: "PaperSetup", into: Path) -> None:
-    """Copy card and weights of each shipped network into a folder of its name."""
+    """Copy card and weights of each of the paper's networks."""
+    from sainet.models.registry import OF_PAPER
+
+    for name in OF_PAPER:
+        (folder,) = setup.train(name, (SEED,))
+        _ship(name, setup.chain, folder, into)
+
+
+def build_strokes(setup: "StrokeSetup", into: Path) -> None:
+    """Copy card and weights of each network of strokes."""
+    from sainet.models.registry import OF_STROKES
+
+    for name in OF_STROKES:
+        _ship(name, setup.chain, setup.train(name), into)
+
+
+def _ship(name: str, chain: "Chain", folder: str, into: Path) -> None:
     from sainet.models.card import CARD, WEIGHTS, read_card
-    from sainet.models.registry import SHIPPED
     from sainet.runs import write_json
 
-    for name in SHIPPED:
-        (folder,) = setup.train(name, (SEED,))
-        target = into / name
-        target.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(setup.chain.out / folder / WEIGHTS, target / WEIGHTS)
-        write_json(target / CARD, whole_card(read_card(setup.chain.out / folder)))
-        setup.chain.say(f"{name} is in {target}")
+    target = into / name
+    target.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(chain.out / folder / WEIGHTS, target / WEIGHTS)
+    write_json(target / CARD, whole_card(read_card(chain.out / folder)))
+    chain.say(f"{name} is in {target}")
 
 
 def whole_card(card: "Card") -> dict[str, Any]:

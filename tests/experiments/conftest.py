@@ -21,6 +21,8 @@ def tiny(monkeypatch):
     """Every experiment as small as it can be."""
     sizes = {"quick": Sizes(pushes=6, tests=4, iterations=1)}
     monkeypatch.setattr("sainet.experiments.paper_setup.SIZES", sizes)
+    strokes = {"quick": (4, 1)}
+    monkeypatch.setattr("sainet.experiments.strokes.SIZES", strokes)
     places: dict[str, object] = {"data_efficiency.PUSHES": {"quick": (3, 6)}}
     places["regularisation.CHOICES"] = (1e-4, 1e-6)
     # The tables have every network; here one is enough, and compiles faster.

@@ -7,7 +7,14 @@ import pytest
 
 from sainet.experiments.paper_setup import paper_setup
 from sainet.models.card import CARD
-from sainet.models.registry import PRETRAINED, SHIPPED, load_dynamics
+from sainet.experiments.strokes import stroke_setup
+from sainet.models.registry import (
+    OF_PAPER,
+    OF_STROKES,
+    PRETRAINED,
+    SHIPPED,
+    load_dynamics,
+)
 from sainet.runs import read_json
 from support import REPOSITORY, require
 
@@ -21,6 +28,9 @@ def test_small_ones_have_the_cards_of_the_shipped_ones(tiny, chain, tmp_path):
     require(find_spec("pybullet"), "PyBullet is not installed")
     tool = runpy.run_path(str(REPOSITORY / "tools" / "pretrained.py"))
     tool["build"](paper_setup("robot", "quick", chain), tmp_path / "into")
+    tool["build_strokes"](stroke_setup("quick", chain), tmp_path / "into")
+    iterations = dict.fromkeys(OF_PAPER, 10_000) | dict.fromkeys(OF_STROKES, 3_000)
+    assert iterations.keys() == set(SHIPPED)
     for name in SHIPPED:
         made, shipped = (
             read_json(folder / name / CARD)
@@ -34,5 +44,5 @@ def test_small_ones_have_the_cards_of_the_shipped_ones(tiny, chain, tmp_path):
             for card in (made, shipped)
         ]
         assert recipes[0] == recipes[1]
-        assert shipped["config"]["iterations"] == 10_000
+        assert shipped["config"]["iterations"] == iterations[name]
         load_dynamics(str(tmp_path / "into" / name)).check_fits("robot", 1 / 240, 1)

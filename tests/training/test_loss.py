@@ -1,5 +1,7 @@
 """The loss of the paper against plain loops, and what was not observed."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -58,6 +60,22 @@ def test_the_loss_is_the_papers(seed):
     case = random_case(seed)
     wanted = [plain_loss(case, push) for push in range(PUSHES)]
     np.testing.assert_allclose(loss_of(*case), wanted, rtol=1e-5)
+
+
+def test_great_losses_count_linearly_where_that_is_asked_for():
+    """Squares near zero; far out the loss grows by twice the limit times the error."""
+    case = random_case()
+    weights = replace(WEIGHTS, linear_from=0.5)
+    small = [0.01 * each for each in case[:3]]
+    for scaled, rtol in ((small, 1e-3), (case[:3], 1.0)):
+        told = jnp.asarray(scaled[0], jnp.float32), as_target(*scaled[1:], *case[3:])
+        squares = np.asarray(push_losses(*told, WEIGHTS))
+        found = np.asarray(push_losses(*told, weights))
+        np.testing.assert_allclose(
+            found, 0.5 * (np.sqrt(1 + squares / 0.25) - 1), rtol=1e-4
+        )
+        assert np.all(found <= squares)
+        assert np.all(squares - found <= rtol * squares)
 
 
 def test_a_whole_turn_is_no_error():

@@ -135,6 +135,18 @@ def test_l2_pulls_with_twice_the_weights():
     assert_same_tree(found, wanted, 1e-5)
 
 
+def test_l2_pulls_back_to_where_training_began():
+    config = FitConfig(batch_size=PUSHES, l2=1e-3, clip_norm=1e9)
+    state = first_state(network("in", "robot"), config)
+    nothing = jax.tree.map(jnp.zeros_like, WEIGHTS)
+    start = jax.tree.map(lambda w: w + 0.1, trained_layers(state.network))
+    after, _ = make_step(config, nothing, start)(state, batch_of("in"))
+    (adam,) = adam_states(after.optimizer)
+    wanted = jax.tree.map(lambda w: jnp.full_like(w, -2e-4), start)
+    found = jax.tree.map(lambda mean: mean / 0.1, adam.mu)
+    assert_same_tree(found, wanted, 1e-4)
+
+
 def adam_states(optimizer):
     is_adam = lambda x: isinstance(x, optax.ScaleByAdamState)  # noqa: E731
     return [x for x in jax.tree.leaves(optimizer, is_leaf=is_adam) if is_adam(x)]

@@ -61,10 +61,15 @@ class Evaluate:
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit the data; say why not."""
         from sainet.errors import BadCheckpoint, MissingExtra
-        from sainet.models.registry import PHYSICS, SHIPPED, load_dynamics
+        from sainet.models.registry import (
+            OF_PAPER,
+            OF_STROKES,
+            PHYSICS,
+            load_dynamics,
+        )
 
         names, info = list(PHYSICS), store.info
-        for name in SHIPPED:
+        for name in OF_STROKES if info.bodies == 1 else OF_PAPER:
             try:
                 model = load_dynamics(name, engine=self.engine, force=self.force)
                 if not self.force:

@@ -14,6 +14,7 @@ from sainet.datasets.schema import published_name, simulated_name, variables
 from sainet.datasets.store import Store
 from sainet.devices import over_devices
 from sainet.errors import BadInput
+from sainet.evaluation.intervals import Folds
 from sainet.evaluation.metrics import (
     REFERENCE_DISTANCE,
     PushErrors,
@@ -41,6 +42,7 @@ class Evaluation:
     groups: tuple[str | None, ...]  # of each push
     reference: float  # m, that trans (%) is relative to
     curves: dict[str, np.ndarray] = field(default_factory=dict)
+    folds: Folds | None = None  # of each push, in a cross-validation
 
     def to_dict(self) -> dict[str, Any]:
         """Return rows, published rows and paired comparisons as JSON values."""
@@ -53,7 +55,10 @@ class Evaluation:
                 for (one, a), (other, b) in pairs
                 for group, part in self._parts()
                 for row in comparison_rows(
-                    (other, b.of_pushes(part)), (one, a.of_pushes(part)), group=group
+                    (other, b.of_pushes(part)),
+                    (one, a.of_pushes(part)),
+                    group=group,
+                    folds=self._folds_of(part),
                 )
             ],
         }
@@ -80,8 +85,14 @@ class Evaluation:
                 self.travel_mm[part],
                 group=group,
                 reference=self.reference,
+                folds=self._folds_of(part),
             )
         ]
+
+    def _folds_of(self, part: np.ndarray) -> Folds | None:
+        if self.folds is None:
+            return None
+        return tuple(np.array(self.folds)[part].tolist())
 
     def _parts(self) -> Iterator[tuple[str | None, np.ndarray]]:
         """Yield each group and which pushes belong to it."""

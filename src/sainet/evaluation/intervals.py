@@ -2,7 +2,8 @@
 
 A network that was trained several times has an axis of trainings before that of pushes:
 both are resampled, for another training differs as another set of test pushes does.
-(SciPy's `bootstrap` resamples one axis.)
+(SciPy's `bootstrap` resamples one axis.) Of a cross-validation folds are resampled,
+then the pushes in each: pushes of one fold were predicted by the same network.
 """
 
 from functools import lru_cache
@@ -15,27 +16,32 @@ _SEED = 0
 _ENDS = (2.5, 97.5)  # percentiles
 
 Values = Float[np.ndarray, "... push quantity"]  # maybe an axis of trainings first
+Folds = tuple[int, ...]  # of each push
 Interval = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, low, high
 
 
-def mean_interval(values: Values) -> Interval:
+def mean_interval(values: Values, folds: Folds | None = None) -> Interval:
     """Return the means over pushes (and trainings) and the ends of their intervals."""
-    return _interval(_mean(values), _resampled(values))
+    return _interval(_mean(values), _resampled(values, folds))
 
 
-def ratio_interval(above: Values, below: Values) -> Interval:
+def ratio_interval(
+    above: Values, below: Values, folds: Folds | None = None
+) -> Interval:
     """Return the ratio of two means over the same pushes, with its interval."""
 
     def ratio(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return x / np.maximum(y, 1e-12)
 
-    drawn = ratio(_resampled(above), _resampled(below))
+    drawn = ratio(_resampled(above, folds), _resampled(below, folds))
     return _interval(ratio(_mean(above), _mean(below)), drawn)
 
 
-def difference_interval(one: Values, other: Values) -> Interval:
+def difference_interval(
+    one: Values, other: Values, folds: Folds | None = None
+) -> Interval:
     """Return the difference of two means over the same pushes, with its interval."""
-    drawn = _resampled(one) - _resampled(other, which=1)
+    drawn = _resampled(one, folds) - _resampled(other, folds, which=1)
     return _interval(_mean(one) - _mean(other), drawn)
 
 
@@ -43,18 +49,22 @@ def _mean(values: Values) -> np.ndarray:
     return values.mean(axis=tuple(range(values.ndim - 1)))
 
 
-def _resampled(values: Values, which: int = 0) -> Float[np.ndarray, "sample quantity"]:
+def _resampled(
+    values: Values, folds: Folds | None, which: int = 0
+) -> Float[np.ndarray, "sample quantity"]:
     """Return the mean of each resample: of the same pushes for every set of values.
 
     Args:
         values: to be resampled.
+        folds: of a cross-validation.
         which: of two sets of trainings, which are drawn apart.
     """
     whole = values.reshape(-1, *values.shape[-2:])
     trainings, pushes, quantities = whole.shape
     if pushes < 2:  # noqa: PLR2004  (one push tells nothing of others)
         return np.full((RESAMPLES, quantities), np.nan)
-    by_training = np.stack([_shares(pushes, _SEED) @ one for one in whole])
+    shares = _shares(pushes, _SEED) if folds is None else _shares_of_folds(folds, _SEED)
+    by_training = np.stack([shares @ one for one in whole])
     return np.einsum("rt,trq->rq", _shares(trainings, 1 + which), by_training)
 
 
@@ -63,6 +73,20 @@ def _shares(count: int, seed: int) -> Float[np.ndarray, "sample count"]:
     """Return how much of each resample every one of so many things makes up."""
     rng = np.random.default_rng((seed, count))
     return rng.multinomial(count, [1 / count] * count, size=RESAMPLES) / count
+
+
+@lru_cache(maxsize=4)
+def _shares_of_folds(folds: Folds, seed: int) -> Float[np.ndarray, "sample push"]:
+    """Return the shares of pushes, where folds are drawn first."""
+    owner = np.unique(folds, return_inverse=True)[1]
+    sizes = np.bincount(owner)
+    rng = np.random.default_rng((seed, len(folds), len(sizes)))
+    often = rng.multinomial(len(sizes), [1 / len(sizes)] * len(sizes), size=RESAMPLES)
+    shares = np.zeros((RESAMPLES, len(folds)))
+    for fold, size in enumerate(sizes):
+        drawn = rng.multinomial(often[:, fold] * size, [1 / size] * size)
+        shares[:, owner == fold] = drawn
+    return shares / shares.sum(axis=1, keepdims=True)
 
 
 def _interval(

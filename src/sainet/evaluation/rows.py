@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from sainet.evaluation.intervals import (
+    Folds,
     difference_interval,
     mean_interval,
     ratio_interval,
@@ -21,6 +22,7 @@ def error_rows(
     *,
     group: str | None,
     reference: float,
+    folds: Folds | None = None,
 ) -> list[dict[str, Any]]:
     """Return one row for each body (1-based).
 
@@ -30,10 +32,11 @@ def error_rows(
         travel_mm: how far the bodies were moved, ``[push, body]``.
         group: its name, if the pushes have groups.
         reference: m, that `trans_percent` is relative to.
+        folds: of each push, where the errors are of a cross-validation.
     """
-    found = {name: mean_interval(getattr(errors, name)) for name in METRICS}
+    found = {name: mean_interval(getattr(errors, name), folds) for name in METRICS}
     found["relative_percent"] = _times(
-        ratio_interval(errors.final_pos_mm, travel_mm), 100
+        ratio_interval(errors.final_pos_mm, travel_mm, folds), 100
     )
     found["trans_percent"] = _times(found["pos_mm"], 0.1 / reference)
     rows = []
@@ -48,13 +51,17 @@ def error_rows(
 
 
 def comparison_rows(
-    one: tuple[str, PushErrors], other: tuple[str, PushErrors], *, group: str | None
+    one: tuple[str, PushErrors],
+    other: tuple[str, PushErrors],
+    *,
+    group: str | None,
+    folds: Folds | None = None,
 ) -> list[dict[str, Any]]:
     """Return paired differences, one minus other, for each metric and body."""
     rows = []
     for metric in METRICS:
         values = getattr(one[1], metric), getattr(other[1], metric)
-        mean, low, high = difference_interval(*values)
+        mean, low, high = difference_interval(*values, folds)
         rows += [
             {
                 "model": one[0],

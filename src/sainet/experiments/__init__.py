@@ -17,6 +17,9 @@ EXPERIMENTS = {
     "simulated-control": "sainet.experiments.simulated_control:run",
     "engine-parity": "sainet.experiments.engine_parity:run",
     "robot-planar": "sainet.experiments.robot_planar:run",
+    "fine-tuning": "sainet.experiments.fine_tuning:run",
+    "recorded-pushes": "sainet.experiments.recorded_pushes:run",
+    "recorded-data-efficiency": "sainet.experiments.recorded_efficiency:run",
 }
 
 

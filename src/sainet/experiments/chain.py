@@ -8,7 +8,8 @@ from pathlib import Path
 
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.datasets.store import Store
+from sainet.datasets.store import Store, open_store
+from sainet.errors import BadInput
 from sainet.evaluation.evaluate import Evaluation, evaluate
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import PHYSICS, load_dynamics
@@ -27,6 +28,7 @@ class Chain:
     executor: Executor
     say: Callable[[str], None]
     bar: Bar
+    recorded: Path | None = None  # dataset of recorded pushes, for what needs one
 
     def simulate(self, name: str, config: GenerateConfig) -> Store:
         """Generate a dataset into a folder of that name."""
@@ -46,6 +48,7 @@ class Chain:
         *,
         name: str | None = None,
         assumed_engine: str = "planar",
+        start_from: str | None = None,
     ) -> FitResult:
         """Train a network into a folder of that name, by default of its own."""
         done, name = 0, name or model
@@ -62,6 +65,7 @@ class Chain:
                 config,
                 self.out / name,
                 assumed_engine=assumed_engine,
+                start_from=start_from,
                 on_step=on_step,
             )
 
@@ -100,6 +104,20 @@ class Chain:
         for model, names in trainings.items():
             found.pool(model, names)
         return found
+
+    def recorded_pushes(self) -> Store:
+        """Return the recorded pushes.
+
+        Raises:
+            BadInput: none were given.
+            BadStore: they cannot be used.
+        """
+        if self.recorded is None:
+            raise BadInput(
+                "--recorded is missing: give the dataset that 'sainet import "
+                "mitpush-endpoints' made of recorded pushes."
+            )
+        return open_store(self.recorded)
 
     def compare(self, models: list[NamedDynamics], store: Store) -> Evaluation:
         """Measure the errors of models on the same pushes."""

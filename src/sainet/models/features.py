@@ -22,7 +22,7 @@ from sainet.scene import Scene
 
 ACTION_SIZE = {"robot": 5, "direct-force": 4}
 FEATURES = ("paper", "place")
-_PLACE_SIZE = 6  # x, y, cos and sin of the body's and of the push frame's angle
+_PLACE_SIZE = 8  # x, y, cos and sin of three angles
 _PAIR_SIZE = 12  # v_i, p_i - p_j, v_i - v_j, m_i, m_j, r_i, r_j
 _BODY_SIZE = 5  # v_i, m_i, r_i
 
@@ -133,8 +133,10 @@ def body_features(
 def _place(motion: Float[Array, "6 body push"], still: Still) -> list[Array]:
     """Return where on the table each body is and how it and the push are turned.
 
-    The friction of a real table varies over it and with direction. Every symmetry of
-    the push frame is given up for that.
+    The friction of a real table varies over it and with direction, and a real body
+    does not rest on it evenly: it matters from which side of its own it is pushed,
+    which is the angle between the two. Every symmetry of the push frame is given up
+    for that.
     """
     if not still.origin.shape[0]:
         return []
@@ -148,6 +150,8 @@ def _place(motion: Float[Array, "6 body push"], still: Still) -> list[Array]:
         sine * own_cosine + cosine * own_sine,
         jnp.broadcast_to(cosine, x.shape),
         jnp.broadcast_to(sine, x.shape),
+        own_cosine,  # its angle in the push frame
+        own_sine,
     ]
     return [jnp.stack(numbers)]
 

@@ -25,7 +25,9 @@ from sainet.models.restarted import Restarted
 
 PHYSICS = {"physics": AssumedProperties, "physics-calibrated": calibrated}
 PRETRAINED = Path(__file__).parent / "pretrained"
-SHIPPED = ("in", "sain", "sain-bullet")
+OF_PAPER = ("in", "sain", "sain-bullet")
+OF_STROKES = ("in-stroke", "sain-stroke")  # of one disk, as recorded on a robot
+SHIPPED = (*OF_PAPER, *OF_STROKES)
 MODELS = (*PHYSICS, *SHIPPED)
 
 
@@ -36,8 +38,9 @@ def load_dynamics(
 
     Args:
         name: `physics`, `physics-calibrated`, a shipped network (`in`, `sain`,
-            `sain-bullet`), or a folder: of a trained network (`./sain`, say, where a
-            shipped one has its name), or of an engine's identified parameters.
+            `sain-bullet`, `in-stroke`, `sain-stroke`), or a folder: of a trained
+            network (`./sain`, say, where a shipped one has its name), or of an
+            engine's identified parameters.
         engine: inside the model; None is planar for physics, and for a network the
             one that it was trained around.
         force: put a network around another engine all the same.

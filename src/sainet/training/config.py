@@ -25,7 +25,8 @@ class FitConfig:
     """Iterations after which the learning rate is halved."""
     l2: float = 1e-6
     """Weight of the squared weights in the loss (the paper's 1e-3 is for a loss in
-    metres, not for the standardised one)."""
+    metres, not for the standardised one). Of a network that training goes on from, the
+    squares of what is changed are meant."""
     steps: int = 200
     """Steps of a push that are trained on; pushes of 600 steps, say, need 600."""
     recurrent: bool = True
@@ -49,6 +50,9 @@ class FitConfig:
     terms: Terms = "motion"
     """What the terms of the loss are measured by: how far things move in the data, or
     how wrong the assumed engine is about it."""
+    linear_from: float = 0.0
+    """Error of a push, as the terms measure it, from which it counts linearly and no
+    longer squared, so that a few failed recordings do not rule; 0: nowhere."""
     validation_share: float = 0.0
     """Share of the pushes, drawn at random, that is kept for validation; the network
     is then the one that was best on them."""
@@ -74,7 +78,7 @@ class FitConfig:
             value = getattr(self, name)
             require_option(math.isfinite(value) and value > 0, name, "positive", value)
         weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
-        for name in ("l2", *weights, "patience", "seed"):
+        for name in ("l2", *weights, "linear_from", "patience", "seed"):
             value = getattr(self, name)
             require_option(
                 math.isfinite(value) and value >= 0, name, "0 or more", value

@@ -34,7 +34,13 @@ from sainet.training.best import Best
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.log import append_log, read_log, rewind_log
 from sainet.training.loss import LossWeights
-from sainet.training.step import FitState, data_loss, even_batch, make_step
+from sainet.training.step import (
+    FitState,
+    data_loss,
+    even_batch,
+    make_step,
+    trained_layers,
+)
 from sainet.training.task import Start, Task, begin, check_data, settings
 
 STATE = "state.safetensors"
@@ -89,6 +95,7 @@ def fit(
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
     state, weights = begin(task)
+    start = trained_layers(state.network) if task.start else None
     validate = _make_validation(task, weights)
     best = Best.first(state.network, validate(state.network)) if validate else None
     if (out / STATE).is_file():
@@ -97,7 +104,7 @@ def fit(
     # Where the step leaves it: otherwise its first call compiles a second time.
     state = jax.device_put(state, jax.devices()[0])
     progress = Progress(state, best, history)
-    step = make_step(config, weights)
+    step = make_step(config, weights, start)
     _iterate(task, progress, step, validate, out=out, on_step=on_step)
     _finish(task, progress, folder)
     return FitResult(out, history)

@@ -12,6 +12,7 @@ class LossWeights(eqx.Module):
     rotation: Float[Array, ""]
     velocity: Float[Array, ""]  # s^2/m^2
     spin: Float[Array, ""]  # s^2/rad^2
+    linear_from: float = eqx.field(static=True, default=0.0)  # 0: nowhere
 
 
 class Target(eqx.Module):
@@ -29,7 +30,8 @@ def push_losses(
     """Return the paper's loss of each push: summed over bodies, mean over time.
 
     Rotations are compared by sine and cosine. What was not observed counts for
-    nothing: the mean is over the observed steps.
+    nothing: the mean is over the observed steps. A push that is wrong by more than
+    `weights.linear_from` counts by its error, not by the square of it.
     """
     pose = _masked_error(
         predicted[..., 0:3], target.pose, target.pose_observed, _pose_error(weights)
@@ -37,7 +39,14 @@ def push_losses(
     rate = _masked_error(
         predicted[..., 3:6], target.rate, target.rate_observed, _rate_error(weights)
     )
-    return pose + rate
+    return _linear_beyond(weights.linear_from, pose + rate)
+
+
+def _linear_beyond(error: float, loss: Array) -> Array:
+    """Return the pseudo-Huber loss: squares up to about this error, then linear."""
+    if not error:
+        return loss
+    return 2 * error**2 * (jnp.sqrt(1 + loss / error**2) - 1)
 
 
 def _pose_error(weights: LossWeights):  # noqa: ANN202

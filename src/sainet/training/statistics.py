@@ -81,6 +81,7 @@ def loss_weights(batch: PushBatch, config: FitConfig) -> LossWeights:
         rotation=config.weight_rotation / _nonzero(jnp.nanmean(pose[..., 2] ** 2)),
         velocity=config.weight_velocity / _nonzero(velocity),
         spin=config.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
+        linear_from=config.linear_from,
     )
 
 

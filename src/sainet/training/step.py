@@ -118,9 +118,11 @@ def _total(sums: tuple[Array, Trained]) -> tuple[Array, Trained]:
 
 
 def make_step(
-    config: FitConfig, weights: LossWeights
+    config: FitConfig, weights: LossWeights, start: Trained | None = None
 ) -> Callable[[FitState, PushBatch], tuple[FitState, Array]]:
     """Return the gradient step; its parts are compiled.
+
+    With layers to go on from, l2 draws towards these and not towards zero.
 
     It takes the state, on the first device, and a batch whose size the devices divide
     (see `even_batch`), and returns the next state and the mean loss of the pushes, l2
@@ -133,7 +135,8 @@ def make_step(
         state: FitState, total: Array, summed: Trained, pushes: Array
     ) -> tuple[FitState, Array]:
         layers = trained_layers(state.network)
-        mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, layers)
+        change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
+        mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, change)
         updates, moments = optimizer.update(mean, state.optimizer, layers)
         network = with_layers(state.network, optax.apply_updates(layers, updates))
         return FitState(network, moments, state.iteration + 1), total / pushes

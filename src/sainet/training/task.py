@@ -33,6 +33,7 @@ _LATER = {
     "recurrent": True,
     "features": "paper",
     "terms": "motion",
+    "linear_from": 0.0,
     "validation_share": 0.0,
     "patience": 0,
 }

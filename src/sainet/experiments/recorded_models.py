@@ -1,0 +1,99 @@
+"""The models that are compared on recorded pushes, and how each comes to be."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+from sainet.datasets.store import Store
+from sainet.engines.identified import read_identified
+from sainet.experiments.chain import Chain
+from sainet.experiments.config import Scale
+from sainet.identification.identify import identify_into
+from sainet.models.checkpoint import load_network
+from sainet.models.dynamics import SimulatorAugmented
+from sainet.models.named import NamedDynamics
+from sainet.models.registry import load_dynamics, network_folder
+from sainet.training.config import FINE_TUNING, Features, FitConfig, ModelKind
+
+IDENTIFIED = "physics-identified"
+_STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
+_ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A network, what it knows, and what of."""
+
+    network: ModelKind
+    learned: Literal["simulation", "tuned", "real"]
+    engine: Literal["nominal", "identified"] = "nominal"  # inside SAIN
+    features: Features = "paper"
+
+    @property
+    def name(self) -> str:
+        """What tables and folders call it."""
+        parts = [
+            self.network,
+            "identified" if self.engine == "identified" else "",
+            self.learned,
+            "place" if self.features == "place" else "",
+        ]
+        return "-".join(part for part in parts if part)
+
+
+@dataclass(frozen=True)
+class Tuner:
+    """Makes models of some training pushes, each in a folder of its own, once."""
+
+    training: Store
+    folder: str  # in that of the chain
+    scale: Scale
+    chain: Chain
+
+    def physics(self) -> list[NamedDynamics]:
+        """Return the engine as it is and with what the training pushes tell of it."""
+        return [
+            load_dynamics("physics"),
+            replace(load_dynamics(str(self._identified())), name=IDENTIFIED),
+        ]
+
+    def models(self, variants: Sequence[Variant]) -> list[NamedDynamics]:
+        """Return networks, trained where they are to be."""
+        return [replace(self._model(each), name=each.name) for each in variants]
+
+    def _model(self, variant: Variant) -> NamedDynamics:
+        start, is_identified = _STROKES[variant.network], variant.engine != "nominal"
+        if variant.learned == "simulation":
+            found = load_dynamics(start)
+            return self._around_identified(found) if is_identified else found
+        result = self.chain.train(
+            variant.network,
+            self.training,
+            self._config(variant),
+            name=f"{self.folder}/{variant.name}",
+            assumed_engine=str(self._identified()) if is_identified else "planar",
+            start_from=start if variant.learned == "tuned" else None,
+        )
+        return load_dynamics(str(result.folder))
+
+    def _around_identified(self, model: NamedDynamics) -> NamedDynamics:
+        """Return a network around another engine than it was trained around."""
+        network = load_network(network_folder(model.name))[0]
+        engine = read_identified(self._identified())
+        return replace(model, dynamics=SimulatorAugmented(network, engine))
+
+    def _config(self, variant: Variant) -> FitConfig:
+        count = self.training.info.pushes
+        return replace(
+            FINE_TUNING,
+            iterations=_ITERATIONS[self.scale],
+            batch_size=min(FINE_TUNING.batch_size, count),
+            features=variant.features,
+        )
+
+    def _identified(self) -> Path:
+        """Return the folder of the engine with what the training pushes tell of it."""
+        folder = self.chain.out / self.folder / "identified"
+        identify_into(self.training, folder)
+        return folder
