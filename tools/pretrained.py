@@ -9,6 +9,7 @@ strokes go on from the paper's, as they are shipped.
 
 import argparse
 import shutil
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.processes import worker_pool
+from sainet.training.config import FitConfig
 
 if TYPE_CHECKING:
     from sainet.experiments.chain import Chain
@@ -80,8 +82,7 @@ def _ship(name: str, chain: "Chain", folder: str, into: Path) -> None:
 
 def whole_card(card: "Card") -> dict[str, Any]:
     """Return a card with the settings that came after its training: their defaults."""
-    config = {"recurrent": card.recurrent, **card.config}
-    return card.to_dict() | {"config": config}
+    return card.to_dict() | {"config": asdict(FitConfig()) | card.config}
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@ from importlib.util import find_spec
 import pytest
 
 from sainet.experiments.paper_setup import paper_setup
-from sainet.models.card import CARD
 from sainet.experiments.strokes import stroke_setup
+from sainet.models.card import CARD
 from sainet.models.registry import (
     OF_PAPER,
     OF_STROKES,

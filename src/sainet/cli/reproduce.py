@@ -22,11 +22,15 @@ class Reproduce:
     """direct-force-two-disks (the paper's Table I), direct-force-three-disks (II) and
     robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
     regularisation and robustness with the networks of Table III; simulated-control
-    with the shipped ones; robot-planar; engine-parity. Default: all."""
+    with the shipped ones; robot-planar; engine-parity; fine-tuning (its settings,
+    chosen on simulated pushes); recorded-pushes and recorded-data-efficiency, which
+    need --recorded. Default: all that can be made."""
     scale: Scale = "quick"
     """quick: minutes. paper: 4,500 pushes and 10,000 iterations."""
     out: Path = Path("runs/reproduce")
     """Folder to write, a folder in it for each experiment."""
+    recorded: Path | None = None
+    """Dataset of recorded pushes: what 'sainet import mitpush-endpoints' made."""
     devices: int | None = None
     """CPU devices to split a batch over; default: one a core."""
     output: Output = field(default_factory=Output)
@@ -42,11 +46,19 @@ class Reproduce:
         tables: dict[str, Any] = {}
         bar = partial(progress_bar, output=self.output)
         with worker_pool(None) as pool:
-            for name in self.experiments or tuple(EXPERIMENTS):
+            for name in self.experiments or self._possible(tuple(EXPERIMENTS)):
                 folder = self.out / f"{name}-{self.scale}"
-                chain = Chain(folder, pool, self.output.say, bar)
+                chain = Chain(folder, pool, self.output.say, bar, self.recorded)
                 tables[name] = load_experiment(name)(self.scale, chain)
                 show = print_control if is_control(tables[name]) else print_table
                 show(tables[name], self.output.console)
         only = next(iter(tables.values()))
         return only if len(tables) == 1 else {"experiments": tables}
+
+    def _possible(self, experiments: tuple[str, ...]) -> tuple[str, ...]:
+        """Leave out what needs recorded pushes where none were given, and say so."""
+        if self.recorded is not None:
+            return experiments
+        needy = [name for name in experiments if name.startswith("recorded-")]
+        self.output.say(f"Left out without --recorded: {', '.join(needy)}.")
+        return tuple(name for name in experiments if name not in needy)

@@ -58,7 +58,7 @@ class Evaluation:
                     (other, b.of_pushes(part)),
                     (one, a.of_pushes(part)),
                     group=group,
-                    folds=self._folds_of(part),
+                    folds=self.folds_of(part),
                 )
             ],
         }
@@ -85,11 +85,12 @@ class Evaluation:
                 self.travel_mm[part],
                 group=group,
                 reference=self.reference,
-                folds=self._folds_of(part),
+                folds=self.folds_of(part),
             )
         ]
 
-    def _folds_of(self, part: np.ndarray) -> Folds | None:
+    def folds_of(self, part: np.ndarray) -> Folds | None:
+        """Return the folds of some pushes, if there are any."""
         if self.folds is None:
             return None
         return tuple(np.array(self.folds)[part].tolist())
@@ -149,6 +150,27 @@ def evaluate(
             parts,
         )
     return _evaluation(store, arrays, errors, parts)
+
+
+def predict_ends(
+    model: NamedDynamics, store: Store
+) -> tuple[Float[np.ndarray, "push body 3"], Float[np.ndarray, "push body 3"]]:
+    """Return predicted and observed poses (m, rad) at the last observed steps.
+
+    Args:
+        model: predicts.
+        store: of pushes that were observed at their ends at least; NaN otherwise.
+    """
+    arrays = _read(store)
+    parts = list(_parts_of_one_length(arrays, store.info.steps))
+    poses = _predict_all(model, store, arrays, parts, lambda name, pushes: None)
+    order = np.argsort(np.concatenate([part for part, _ in parts]))
+    truths = [_truth(arrays, part, steps) for part, steps in parts]
+    predicted = [
+        final_pose(pose, seen) for pose, (_, seen) in zip(poses, truths, strict=True)
+    ]
+    observed = [final_pose(*truth) for truth in truths]
+    return np.concatenate(predicted)[order], np.concatenate(observed)[order]
 
 
 def _read(store: Store) -> dict[str, np.ndarray]:

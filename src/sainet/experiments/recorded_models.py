@@ -5,6 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+from jaxtyping import Int
+
 from sainet.datasets.store import Store
 from sainet.engines.identified import read_identified
 from sainet.experiments.chain import Chain
@@ -17,6 +20,8 @@ from sainet.models.registry import load_dynamics, network_folder
 from sainet.training.config import FINE_TUNING, Features, FitConfig, ModelKind
 
 IDENTIFIED = "physics-identified"
+Inside = Literal["nominal", "identified"]  # the engine in SAIN
+Learned = Literal["simulation", "tuned", "real"]
 _STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
 _ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
 
@@ -26,8 +31,8 @@ class Variant:
     """A network, what it knows, and what of."""
 
     network: ModelKind
-    learned: Literal["simulation", "tuned", "real"]
-    engine: Literal["nominal", "identified"] = "nominal"  # inside SAIN
+    learned: Learned
+    engine: Inside = "nominal"
     features: Features = "paper"
 
     @property
@@ -40,6 +45,14 @@ class Variant:
             "place" if self.features == "place" else "",
         ]
         return "-".join(part for part in parts if part)
+
+
+def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
+    """Return the pushes on each surface; a group is surface and speed: ``abs-10``."""
+    known = [name.rpartition("-")[0] or name for name in store.info.groups]
+    groups = known or ["recorded"]
+    owner = np.array(groups)[store.read(slice(None), ("group",))["group"]]
+    return {name: np.flatnonzero(owner == name) for name in dict.fromkeys(groups)}
 
 
 @dataclass(frozen=True)

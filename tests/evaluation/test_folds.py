@@ -1,0 +1,59 @@
+"""Folds: every push is tested once, by what saw no repeat of it."""
+
+import numpy as np
+import pytest
+
+from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.folds import fold_of_push, join_folds, make_folds
+from sainet.models.registry import load_dynamics
+from training.stores import end_points_alone, info_of, made_up, write
+
+REPEATS = np.random.default_rng(0).permutation(np.repeat(np.arange(9), 3))
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    info = info_of(27, engine="recorded", seed=None, has_repeats=True, bodies=1)
+    arrays = end_points_alone(made_up(info)) | {"repeat": REPEATS}
+    return write(tmp_path_factory.mktemp("folds") / "data", info, arrays)
+
+
+def test_every_push_is_tested_once_and_repeats_stay_together(store):
+    folds = make_folds(store, 3)
+    tested = np.concatenate([fold.rows for fold in folds])
+    assert sorted(tested) == list(range(27))
+    for fold in folds:
+        assert len(fold.rows) == 9
+        assert fold.training.info.pushes == 18
+        assert not set(fold.training.repeats()) & set(fold.tests.repeats())
+        np.testing.assert_array_equal(fold.tests.repeats(), REPEATS[fold.rows])
+
+
+def test_a_part_is_divided_as_the_whole_is(store):
+    part = np.arange(1, 27, 2)
+    whole = fold_of_push(REPEATS, 3)
+    for fold in make_folds(store, 3, part):
+        np.testing.assert_array_equal(fold.rows, part[whole[part] == fold.number])
+        assert set(fold.training.rows) == set(part) - set(fold.rows)
+
+
+def test_another_seed_draws_other_folds():
+    assert (fold_of_push(REPEATS, 3, 0) != fold_of_push(REPEATS, 3, 1)).any()
+
+
+def test_the_errors_of_all_folds_are_those_of_the_whole_in_its_order(store):
+    models = [load_dynamics("physics")]
+    folds = make_folds(store, 3)
+    joined = join_folds([(fold, evaluate(models, fold.tests)) for fold in folds[::-1]])
+    whole = evaluate(models, store)
+    np.testing.assert_allclose(
+        joined.errors["physics"].final_pos_mm,
+        whole.errors["physics"].final_pos_mm,
+        rtol=1e-4,
+    )
+    np.testing.assert_array_equal(joined.travel_mm, whole.travel_mm)
+    assert joined.groups == whole.groups
+    np.testing.assert_array_equal(joined.folds, fold_of_push(REPEATS, 3))
+    narrow, wide = (each.to_dict()["rows"][0] for each in (whole, joined))
+    assert narrow["final_pos_mm"] == pytest.approx(wide["final_pos_mm"], rel=1e-4)
+    assert narrow["final_pos_mm_interval"] != wide["final_pos_mm_interval"]
