@@ -152,7 +152,7 @@ def _elsewhere(store: Store, scale: Scale, chain: Chain) -> Iterator[dict[str, A
     if not {_FROM, _TO} <= surfaces.keys():
         return
     few, tests = _few(store, surfaces[_TO])
-    for count, rows in ((0, surfaces[_FROM]), (FEW, [*surfaces[_FROM], *few])):
+    for count, rows in ((0, surfaces[_FROM]), (FEW, np.append(surfaces[_FROM], few))):
         folder = f"{_FROM}-to-{_TO}-with-{count}"
         tuner = Tuner(store.take(rows), folder, scale, chain)
         models = [*tuner.physics(), *tuner.models(ELSEWHERE)]

@@ -1,0 +1,112 @@
+"""The tables of recorded pushes, tiny and on made-up ones: who is made of what."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sainet.errors import BadInput
+from sainet.experiments import load_experiment, recorded_efficiency, recorded_pushes
+from sainet.experiments.recorded_models import Variant, surfaces_of
+from sainet.models.card import read_card
+from sainet.runs import read_json
+from training.stores import end_points_alone, info_of, made_up, write
+
+FEW = (
+    Variant("sain", "simulation", "identified"),
+    Variant("sain", "tuned"),
+    Variant("sain", "real", "identified", "place"),
+)
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Twelve pushes on each of two surfaces, in pairs of repeats."""
+    info = info_of(
+        24,
+        engine="recorded",
+        seed=None,
+        bodies=1,
+        groups=("abs-10", "abs-20", "plywood-10"),
+        published=("convex",),
+        has_repeats=True,
+    )
+    arrays = end_points_alone(made_up(info))
+    arrays |= {"group": np.repeat([0, 1, 2], [6, 6, 12])}
+    arrays |= {"repeat": np.repeat(np.arange(12), 2)}
+    arrays |= {"published_convex": arrays["initial"][..., :3]}
+    return write(tmp_path / "recorded", info, arrays)
+
+
+@pytest.fixture
+def make(chain, recorded, monkeypatch, tmp_path):
+    monkeypatch.setattr(recorded_pushes, "VARIANTS", FEW)
+    monkeypatch.setattr(recorded_pushes, "FOR_ALL", FEW[1:2])
+    monkeypatch.setattr(recorded_pushes, "ELSEWHERE", FEW[:2])
+    monkeypatch.setattr(recorded_efficiency, "VARIANTS", FEW[1:2])
+    monkeypatch.setattr(recorded_efficiency, "PUSHES", {"quick": (3, 5)})
+    models = "sainet.experiments.recorded_models"
+    monkeypatch.setattr(f"{models}._ITERATIONS", {"quick": 1})
+    whole = replace(chain, recorded=recorded.path)
+    return lambda name: load_experiment(name)(
+        "quick", replace(whole, out=tmp_path / name)
+    )
+
+
+def test_surfaces_are_groups_without_their_speed(recorded):
+    found = {name: rows.tolist() for name, rows in surfaces_of(recorded).items()}
+    assert found == {"abs": [*range(12)], "plywood": [*range(12, 24)]}
+
+
+def test_without_recorded_pushes_there_is_no_table(chain):
+    for name in ("recorded-pushes", "recorded-data-efficiency"):
+        with pytest.raises(BadInput, match="--recorded is missing"):
+            load_experiment(name)("quick", chain)
+
+
+@pytest.mark.slow
+def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
+    table = make("recorded-pushes")
+    names = {"physics", "physics-identified", *(each.name for each in FEW)}
+    everywhere = {*names, "sain-tuned-for-all"}
+    rows = {(row["group"], row["model"]): row for row in table["rows"]}
+    groups = {"abs": 12, "plywood": 12, "all": 24}
+    for group, count in groups.items():
+        assert {model for where, model in rows if where == group} == everywhere
+        assert {rows[group, model]["n"] for model in everywhere} == {count}
+        assert rows[group, "physics"]["final_pos_mm_interval"][0] is not None
+    elsewhere = {where for where, _ in rows} - groups.keys()
+    assert elsewhere == {"abs to plywood, 0 of it", "abs to plywood, 50 of it"}
+    assert {row["model"] for row in table["published"]} == {"convex"}
+    against = {row["against"] for row in table["comparisons"]}
+    assert against == (everywhere | {"convex"}) - {"sain-tuned"}
+    folder = tmp_path / "recorded-pushes"
+    assert (folder / "engine-errors.svg").is_file()
+    assert read_json(folder / "table.json")["rows"] == table["rows"]
+    cards = {
+        path.parent.relative_to(folder).as_posix(): read_card(path.parent)
+        for path in folder.rglob("card.json")
+    }
+    trained = {"sain-tuned", "sain-identified-real-place"}
+    assert {name for name in cards if name.startswith(("abs/", "ply"))} == {
+        f"{surface}/fold-{fold}/{name}"
+        for surface in ("abs", "plywood")
+        for fold in (0, 1)
+        for name in trained
+    }
+    real = cards["abs/fold-0/sain-identified-real-place"]
+    assert (real.started_from, real.features) == (None, "place")
+    assert real.inner_engine == "identified"
+    tuned = [card for name, card in cards.items() if name.endswith("sain-tuned")]
+    assert {card.started_from for card in tuned} == {tuned[0].started_from} != {None}
+    assert len({card.data for card in cards.values()}) == 8  # no two saw the same
+
+
+@pytest.mark.slow
+def test_more_pushes_hold_the_fewer(make, tmp_path):
+    table = make("recorded-data-efficiency")
+    groups = {row["group"] for row in table["rows"]}
+    assert groups == {"3", "5"}
+    assert {row["n"] for row in table["rows"]} == {24}
+    folder = tmp_path / "recorded-data-efficiency"
+    assert (folder / "recorded-data-efficiency.svg").is_file()
