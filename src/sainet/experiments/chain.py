@@ -119,12 +119,17 @@ class Chain:
             )
         return open_store(self.recorded)
 
-    def compare(self, models: list[NamedDynamics], store: Store) -> Evaluation:
-        """Measure the errors of models on the same pushes."""
+    def compare(
+        self, models: list[NamedDynamics], store: Store, *, steps: int | None = None
+    ) -> Evaluation:
+        """Measure the errors of models on the same pushes; `steps` as of `evaluate`."""
         total = len(models) * store.info.pushes
         with self.bar("Predicting", total) as advance:
             return evaluate(
-                models, store, on_pushes=lambda model, pushes: advance(pushes, model)
+                models,
+                store,
+                steps=steps,
+                on_pushes=lambda model, pushes: advance(pushes, model),
             )
 
     def models(

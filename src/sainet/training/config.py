@@ -91,13 +91,16 @@ class FitConfig:
             )
 
 
-# For a network that goes on from another on few recorded pushes.
+# For a network that goes on from another on few recorded pushes; l2, linear_from and the
+# learning rate are what `sainet reproduce fine-tuning` chose on simulated ones.
 FINE_TUNING = FitConfig(
     iterations=1_000,
     batch_size=50,
     halve_every=250,
+    l2=3e-2,
     steps=10_000,
     terms="error",
+    linear_from=0.5,
     validation_share=0.2,
     patience=300,
     log_every=25,
