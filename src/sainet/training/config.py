@@ -91,8 +91,8 @@ class FitConfig:
             )
 
 
-# For a network that goes on from another on few recorded pushes; l2, linear_from and the
-# learning rate are what `sainet reproduce fine-tuning` chose on simulated ones.
+# For a network that goes on from another on few recorded pushes. Learning rate, l2 and
+# linear_from are what `sainet reproduce fine-tuning` chose on simulated ones.
 FINE_TUNING = FitConfig(
     iterations=1_000,
     batch_size=50,
