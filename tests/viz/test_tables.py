@@ -101,6 +101,24 @@ def test_metrics_without_numbers_are_left_out():
     assert "trans" not in printed(result)
 
 
+def test_where_ends_alone_are_known_nothing_is_said_twice():
+    rows = [samples.row(model, 1, 0.5) for model in ("physics", "sain")]
+    for row in rows:
+        row |= {"pos_mm": row["final_pos_mm"], "rot_deg": row["final_rot_deg"]}
+    pair = {"model": "sain", "against": "physics", "group": None, "body": 1}
+    told = [
+        pair | {"metric": metric, "difference": -1.0, "interval": [-2.0, -0.5]}
+        for metric in ("pos_mm", "final_pos_mm")
+    ]
+    result = {"rows": rows, "comparisons": told}
+    heading = to_markdown(result).splitlines()[0]
+    assert heading.split(" | ")[2:4] == ["final pos (mm)", "final rot (deg)"]
+    assert "trans" not in printed(result)
+    assert printed(result).count("−1.000") == 1
+    alone = {"rows": rows, "comparisons": told[1:]}  # of ends alone: still said
+    assert printed(alone).count("−1.000") == 1
+
+
 def test_nothing_at_all_is_said_in_words():
     for text in (to_html({"rows": []}), to_markdown({"rows": []}), printed({})):
         assert "Nothing to show" in text

@@ -28,10 +28,13 @@ class Metric:
         return f"{self.name} ({self.unit})"
 
 
-METRICS = (
+OVER_STEPS = (
     Metric("trans_percent", "trans", "%"),
     Metric("pos_mm", "pos", "mm"),
     Metric("rot_deg", "rot", "deg"),
+)
+METRICS = (
+    *OVER_STEPS,
     Metric("final_pos_mm", "final pos", "mm"),
     Metric("final_rot_deg", "final rot", "deg"),
     Metric("relative_percent", "pos/travel", "%", 1),
@@ -104,10 +107,12 @@ def arrange(
     """Return the table of a result; metrics without any number are left out."""
     ours: list[Mapping[str, Any]] = list(result.get("rows") or ())
     theirs: list[Mapping[str, Any]] = list(result.get("published") or ())
+    repeated = OVER_STEPS if _are_ends_alone(ours) else ()
     used = tuple(
         metric
         for metric in metrics
-        if any(_number(row.get(metric.key)) is not None for row in ours + theirs)
+        if metric not in repeated
+        and any(_number(row.get(metric.key)) is not None for row in ours + theirs)
     )
     bodies = tuple(sorted({int(row["body"]) for row in ours + theirs}))
     labels = {
@@ -123,6 +128,13 @@ def arrange(
     )
 
 
+def _are_ends_alone(rows: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether the ends alone of pushes were observed: a mean over steps is the end."""
+    keys = ("pos_mm", "final_pos_mm")
+    ends = [tuple(_number(row.get(key)) for key in keys) for row in rows]
+    return bool(ends) and all(one is not None and one == other for one, other in ends)
+
+
 def _worth_saying(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the comparisons that a reader has to see; the JSON holds them all.
 
@@ -131,11 +143,13 @@ def _worth_saying(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """
     every: list[Mapping[str, Any]] = list(result.get("comparisons") or ())
     telling = [
-        each
-        for each in every
-        if each["against"] != "physics" and not each["metric"].startswith("final")
+        each for each in every if each["against"] != "physics" and not _is_of_end(each)
     ]
-    return telling or every
+    return telling or [e for e in every if not _is_of_end(e)] or every
+
+
+def _is_of_end(comparison: Mapping[str, Any]) -> bool:
+    return str(comparison["metric"]).startswith("final")
 
 
 def _lines(

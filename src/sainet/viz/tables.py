@@ -15,7 +15,15 @@ from rich.table import Table
 from rich.text import Text
 
 from sainet.viz.palette import styles_of
-from sainet.viz.rows import METRICS, Cell, ErrorTable, Line, Metric, arrange
+from sainet.viz.rows import (
+    METRICS,
+    OVER_STEPS,
+    Cell,
+    ErrorTable,
+    Line,
+    Metric,
+    arrange,
+)
 from sainet.viz.templates import render
 
 _NOTE = (
@@ -24,7 +32,7 @@ _NOTE = (
 )
 # What a terminal shows side by side: means over the steps, then the rest.
 _ANY_WIDTH = 10_000  # characters
-_BLOCKS = (METRICS[:3], METRICS[3:])
+_BLOCKS = (OVER_STEPS, METRICS[len(OVER_STEPS) :])
 
 
 def print_table(result: Mapping[str, Any], console: Console) -> None:
