@@ -97,11 +97,9 @@ class Tuner:
         return replace(model, dynamics=SimulatorAugmented(network, engine))
 
     def _config(self, variant: Variant) -> FitConfig:
-        """Return the recipe of fine-tuning; a network that begins anew is not held."""
         count = self.training.info.pushes
         return replace(
             FINE_TUNING,
-            l2=FINE_TUNING.l2 if variant.learned == "tuned" else FitConfig.l2,
             iterations=_ITERATIONS[self.scale],
             batch_size=min(FINE_TUNING.batch_size, count),
             features=variant.features,
