@@ -91,8 +91,8 @@ class FitConfig:
             )
 
 
-# For a network that goes on from another on few recorded pushes. Learning rate and l2 are
-# the usual ones: `sainet reproduce fine-tuning` finds no difference to act on.
+# For a network that goes on from another on few recorded pushes. Learning rate and l2
+# are the usual ones: `sainet reproduce fine-tuning` finds no difference to act on.
 FINE_TUNING = FitConfig(
     iterations=1_000,
     batch_size=50,
