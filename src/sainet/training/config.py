@@ -53,6 +53,9 @@ class FitConfig:
     linear_from: float = 0.0
     """Error of a push, as the terms measure it, from which it counts linearly and no
     longer squared, so that a few failed recordings do not rule; 0: nowhere."""
+    mirror: bool = False
+    """Show about half of the pushes of each batch mirrored, others each time: disks on
+    an even table know no left and right. Not to networks that see the place."""
     validation_share: float = 0.0
     """Share of the pushes, drawn at random, that is kept for validation; the network
     is then the one that was best on them."""

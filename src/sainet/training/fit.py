@@ -158,7 +158,8 @@ def _iterate(
         for iteration in range(
             int(progress.state.iteration) + 1, config.iterations + 1
         ):
-            batch = even_batch(task.to_batch(*reader.batch(iteration - 1)))
+            arrays = reader.batch(iteration - 1)
+            batch = even_batch(task.to_training_batch(*arrays, iteration))
             progress.state, loss = step(progress.state, batch)
             last = iteration == config.iterations
             if iteration % config.log_every == 0 or last:

@@ -20,6 +20,7 @@ from sainet.models.widen import widen
 from sainet.training.assumed import AssumedEngine
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.loss import LossWeights
+from sainet.training.mirror import mirror_some
 from sainet.training.single_steps import to_single_steps
 from sainet.training.split import split
 from sainet.training.statistics import feature_scales, loss_weights
@@ -34,6 +35,7 @@ _LATER = {
     "features": "paper",
     "terms": "motion",
     "linear_from": 0.0,
+    "mirror": False,
     "validation_share": 0.0,
     "patience": 0,
 }
@@ -98,6 +100,15 @@ class Task:
     def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
         """Turn stored arrays into a batch with what the network sees."""
         return self._batch(arrays, steps, self.inner)
+
+    def to_training_batch(
+        self, arrays: dict[str, np.ndarray], steps: int, iteration: int
+    ) -> PushBatch:
+        """Turn stored arrays into what an iteration is trained on."""
+        batch, config = self.to_batch(arrays, steps), self.config
+        if not config.mirror or config.features == "place":
+            return batch
+        return mirror_some(batch, config.seed, iteration)
 
     def to_sample(self, arrays: dict[str, np.ndarray]) -> PushBatch:
         """Return what statistics are of: s-bar stands in for an unknown truth."""
