@@ -113,16 +113,7 @@ def _recorded() -> str:
     data = _imported()
     words = ("evaluate", "--model", "physics", *OF_STROKES, "--data", str(data))
     strokes = RUNS / "strokes-paper" / "test"
-    made = (
-        "--speed-mm-s",
-        "10",
-        "--pushes",
-        "200",
-        "--seed",
-        "5",
-        "--engine",
-        "bullet",
-    )
+    made = ("--speed-mm-s", "10", "--pushes", "200", "--seed", "5")
     _run("generate", *_KIND.split(), *made, "--out", str(strokes))
     models = ("physics", "physics-calibrated", *OF_STROKES)
     simulated = ("evaluate", "--model", *models, "--data", str(strokes), "--steps", "0")
@@ -245,7 +236,10 @@ def _choice(choices: list[dict[str, float]]) -> str:
     return f"{said} and stays: with one training each, that is no difference to act on."
 
 
-_KIND = "robot --disks 1 --stroke-mm 50 --direction-deg 80 --gap-mm 1 --hold-steps 40"
+_KIND = (
+    "robot --disks 1 --mass-kg 0.85 0.95 --radius-mm 52.5 --stroke-mm 50 "
+    "--direction-deg 80 --gap-mm 1 --hold-steps 40 --tracking-mm 0"
+)
 
 
 def _parity() -> str:

@@ -10,6 +10,7 @@ from sainet.experiments import load_experiment, recorded_efficiency, recorded_pu
 from sainet.experiments.recorded_models import Variant, surfaces_of
 from sainet.models.card import read_card
 from sainet.runs import read_json
+from sainet.training.config import FINE_TUNING
 from training.stores import end_points_alone, info_of, made_up, write
 
 FEW = (
@@ -47,6 +48,9 @@ def make(chain, recorded, monkeypatch, tmp_path):
     monkeypatch.setattr(recorded_efficiency, "PUSHES", {"quick": (3, 5)})
     models = "sainet.experiments.recorded_models"
     monkeypatch.setattr(f"{models}._ITERATIONS", {"quick": 1})
+    # Of one size, so that everything compiles once.
+    few = replace(FINE_TUNING, batch_size=4)
+    monkeypatch.setattr(f"{models}.FINE_TUNING", few)
     whole = replace(chain, recorded=recorded.path)
     return lambda name: load_experiment(name)(
         "quick", replace(whole, out=tmp_path / name)

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from sainet.datasets.config import GenerateConfig
 from sainet.datasets.derive import Arrays, derive
 from sainet.datasets.recorded import simulate
 from sainet.datasets.schema import StoreInfo, simulated_name
@@ -19,6 +18,7 @@ from sainet.datasets.store import Store
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import join
+from sainet.experiments.strokes import STROKES
 from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
 from sainet.training.config import FINE_TUNING
@@ -76,17 +76,12 @@ def _score(rows: list[dict[str, Any]]) -> float:
 def _stand_in(name: str, pushes: int, seed: int, chain: Chain) -> Store:
     made = chain.simulate(
         f"{name}-simulated",
-        GenerateConfig(
-            disks=1,
+        replace(
+            STROKES,
             pushes=pushes,
             chunk_size=pushes,
             seed=100 + seed,  # of none that a shipped network was trained on
-            mass_kg=(0.8937,),
-            radius_mm=(52.5,),
             contact_friction=(_TRUE,),
-            direction_deg=80.0,
-            gap_mm=1.0,
-            stroke_mm=(50.0,),
             speed_mm_s=(20.0,),
             hold_steps=0,
             noise_level="paper-like",
