@@ -5,6 +5,7 @@ ones, but simulated, with three times the usual noise and a friction of contact 
 the engine inside the model does not know; each push is seen at its ends alone.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -25,8 +26,9 @@ from sainet.training.config import FINE_TUNING
 
 START = "sain-stroke"
 LEARNING_RATES = (3e-4, 1e-3)
-L2 = (1e-6, 3e-3, 3e-2)
+L2 = (1e-6, 3e-2)
 LINEAR_FROM = (0.0, 0.5)
+MIRROR = (False, True)
 _BELIEVED, _TRUE = 0.25, 0.4  # friction of contact
 _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
 _ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
@@ -43,9 +45,8 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     training = _stand_in("training", _TRAINING[scale], 0, chain)
     tests = _stand_in("tests", _TESTS[scale], 1, chain)
     tables, choices = [], []
-    for rate, l2, linear_from in product(LEARNING_RATES, L2, LINEAR_FROM):
-        words = {"learning_rate": rate, "l2": l2, "linear_from": linear_from}
-        name = f"rate-{rate:g}-l2-{l2:g}-linear-{linear_from:g}"
+    for words in choices_of():
+        name = "-".join(f"{key}-{value:g}" for key, value in words.items())
         config = replace(
             FINE_TUNING,
             iterations=_ITERATIONS[scale],
@@ -63,6 +64,14 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     table = join(tables) | {"choices": choices}
     write_json(chain.out / "table.json", table)
     return table
+
+
+def choices_of() -> Iterator[dict[str, Any]]:
+    """Yield the settings that are considered, each with a value of its own."""
+    for values in product(LEARNING_RATES, L2, LINEAR_FROM, MIRROR):
+        yield dict(
+            zip(("learning_rate", "l2", "linear_from", "mirror"), values, strict=True)
+        )
 
 
 def _score(rows: list[dict[str, Any]]) -> float:
