@@ -131,25 +131,25 @@ def _recorded() -> str:
 def _tuning() -> str:
     words = ("reproduce", "fine-tuning", "--scale", "paper", "--out", str(RUNS))
     found = _run(*words)
+    names = ("learning_rate", "l2", "linear_from", "mirror")
     lines = [
-        "| learning rate | l2 | linear from | score |",
-        "| --: | --: | --: | --: |",
+        f"| {' | '.join(name.replace('_', ' ') for name in names)} | score |",
+        "| --: | --: | --: | :-- | --: |",
     ]
     for choice in found["choices"]:
-        rate, l2, linear = (choice[n] for n in ("learning_rate", "l2", "linear_from"))
-        lines.append(f"| {rate:g} | {l2:g} | {linear:g} | {choice['score']:.4f} |")
-    scores = [choice["score"] for choice in found["choices"]]
+        told = [_short(choice[name]) for name in names]
+        lines.append(f"| {' | '.join(told)} | {choice['score']:.4f} |")
+    scores = {tuple(c[name] for name in names): c["score"] for c in found["choices"]}
+    chosen = scores[tuple(getattr(FINE_TUNING, name) for name in names)]
     return (
         f"`sainet {' '.join(words)}`: `sain-stroke` tuned on 200 simulated pushes, of "
         "which the ends alone are seen, of a robot whose friction of contact (0.4) the "
         "engine does not know (0.25), with three times the usual noise; compared on "
-        "300 others. The score is the mean error over that of physics.\n\n"
+        "300 others. The score is the mean error over that of physics, one training "
+        "each.\n\n"
         + "\n".join(lines)
-        + f"\n\nFrom the best to the worst the scores differ by "
-        f"{max(scores) / min(scores) - 1:.1%}: no difference to act on, with one "
-        "training each. Learning rate and l2 stay as they are elsewhere; "
-        f"`linear_from` {FINE_TUNING.linear_from:g} is a choice made in advance, "
-        "because recordings fail now and then."
+        + f"\n\nThe defaults of `--start-from` have {chosen:.4f}, the least is "
+        f"{min(scores.values()):.4f}."
     )
 
 
