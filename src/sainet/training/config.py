@@ -94,8 +94,8 @@ class FitConfig:
             )
 
 
-# For a network that goes on from another on few recorded pushes. Learning rate and l2
-# are the usual ones: `sainet reproduce fine-tuning` finds no difference to act on.
+# For a network that goes on from another on few recorded pushes: the least error on
+# simulated ones that stand in for them (`sainet reproduce fine-tuning`).
 FINE_TUNING = FitConfig(
     iterations=1_000,
     batch_size=50,
@@ -103,6 +103,7 @@ FINE_TUNING = FitConfig(
     steps=10_000,
     terms="error",
     linear_from=0.5,
+    mirror=True,
     validation_share=0.2,
     patience=300,
     log_every=25,
