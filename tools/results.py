@@ -124,8 +124,9 @@ def _recorded() -> str:
         f"pushes of this kind and none of these.\n\n{to_markdown(_run(*words))}\n"
         "The contact friction of 0.25 is `mu` in a published log of the same robot and "
         "what an earlier sweep on these same pushes chose: it is no blind guess.\n\n"
-        f"The same networks on simulated strokes (`sainet generate {_KIND} "
-        f"{' '.join(made)}`):\n\n{to_markdown(_run(*simulated))}"
+        "The same networks on simulated strokes, whose truth is this engine: physics "
+        "is right there, and what a network adds is its own error (`sainet generate "
+        f"{_KIND} {' '.join(made)}`):\n\n{to_markdown(_run(*simulated))}"
     )
 
 
