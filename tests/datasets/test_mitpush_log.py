@@ -164,10 +164,10 @@ def test_a_cut_row_and_a_long_one_are_named(tmp_path: Path):
     path = write_csv(tmp_path / "t.csv", {}, {}, {})
     whole = path.read_bytes()
     path.write_bytes(whole[:-30])
-    assert "row 4: has 11 fields, not 16" in refusal(path)
+    assert "row 4: has 13 fields, not 18" in refusal(path)
     lines = whole.splitlines()
     path.write_bytes(b"\n".join([lines[0], lines[1] + b",7", lines[2], b""]))
-    assert "row 2: has 17 fields, not 16" in refusal(path)
+    assert "row 2: has 19 fields, not 18" in refusal(path)
 
 
 def test_a_quote_that_never_closes_is_refused(tmp_path: Path):

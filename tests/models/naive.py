@@ -146,7 +146,7 @@ def place_inputs(local, motion, i: int) -> np.ndarray:
     """Where on the table a body is, how it is turned there, and the push."""
     x, y, turn = to_table(local, motion)[i, :3]
     angle = local.angle
-    return np.array([x, y, *unit(turn), *unit(angle)])
+    return np.array([x, y, *unit(turn), *unit(angle), *unit(turn - angle)])
 
 
 def unit(angle) -> list[float]:

@@ -156,7 +156,7 @@ def test_pushes_with_known_ends_alone_can_be_trained_on(tmp_path):
 
 def never_learns(loss):
     """A stand-in for `make_step` that costs nothing."""
-    return lambda config, weights: lambda state, batch: (state, loss)
+    return lambda config, weights, start: lambda state, batch: (state, loss)
 
 
 def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch):

@@ -67,7 +67,7 @@ def test_great_losses_count_linearly_where_that_is_asked_for():
     case = random_case()
     weights = replace(WEIGHTS, linear_from=0.5)
     small = [0.01 * each for each in case[:3]]
-    for scaled, rtol in ((small, 1e-3), (case[:3], 1.0)):
+    for scaled, rtol in ((small, 1e-2), (case[:3], 1.0)):
         told = jnp.asarray(scaled[0], jnp.float32), as_target(*scaled[1:], *case[3:])
         squares = np.asarray(push_losses(*told, WEIGHTS))
         found = np.asarray(push_losses(*told, weights))

@@ -68,7 +68,7 @@ class Task:
     @property
     def names(self) -> tuple[str, ...]:
         """The arrays of the store that training reads."""
-        unread = ("truth_pusher", "group", "published")
+        unread = ("truth_pusher", "group", "repeat", "published")
         skip = lambda name: name.startswith(("simulated_", *unread))  # noqa: E731
         kept = [name for name in variables(self.store.info) if not skip(name)]
         if not self.assumed.is_stored:
