@@ -102,13 +102,15 @@ def test_an_interrupted_episode_is_kept_beside(tmp_path, monkeypatch):
 
 
 _TELLING = """
-import functools, pathlib, sys, time
+import functools, pathlib, signal, sys, time
 from sainet.control import trials
 trials.run_episode = functools.partial(
     trials.run_episode,
     # Slow enough to be interrupted, however busy the machine is.
     on_turn=lambda turn: (print("pushed", flush=True), time.sleep(0.5)),
 )
+# A shell has its background jobs ignore the signal, and children inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 config = trials.ControlConfig(model="physics", trials=1, pushes=60)
 trials.run_trials(config, pathlib.Path(sys.argv[1]))
 """
