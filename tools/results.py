@@ -64,6 +64,11 @@ def _run(*words: str) -> dict[str, Any]:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+def _reproduce(name: str, *more: str) -> tuple[str, ...]:
+    """Return the command that makes a table at the paper's scale."""
+    return ("reproduce", name, "--scale", "paper", "--out", str(RUNS), *more)
+
+
 def _seconds(*command: str) -> float:
     start = time.perf_counter()
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
@@ -82,7 +87,7 @@ def _head() -> str:
 
 
 def _robot() -> str:
-    words = ("reproduce", "robot-planar", "--scale", "paper", "--out", str(RUNS))
+    words = _reproduce("robot-planar")
     return (
         f"`sainet {' '.join(words)}`: 4,500 pushes, 10,000 iterations, 500 test "
         "pushes, three trainings of each network (intervals are over pushes and "
@@ -131,7 +136,7 @@ def _recorded() -> str:
 
 
 def _tuning() -> str:
-    words = ("reproduce", "fine-tuning", "--scale", "paper", "--out", str(RUNS))
+    words = _reproduce("fine-tuning")
     found = _run(*words)
     names = ("learning_rate", "l2", "linear_from", "mirror")
     lines = [
@@ -146,7 +151,8 @@ def _tuning() -> str:
     return (
         f"`sainet {' '.join(words)}`: `sain-stroke` tuned on 200 simulated pushes, of "
         "which the ends alone are seen, of a robot whose friction of contact (0.4) the "
-        "engine does not know (0.25), with three times the usual noise; compared on "
+        "engine does not know (0.25), with three times the usual noise of friction and "
+        "camera; compared on "
         "300 others. The score is the mean error over that of physics, one training "
         "each.\n\n"
         + "\n".join(lines)
@@ -156,8 +162,7 @@ def _tuning() -> str:
 
 
 def _recorded_pushes() -> str:
-    words = ("reproduce", "recorded-pushes", "--scale", "paper", "--out", str(RUNS))
-    words = (*words, "--recorded", str(_imported()))
+    words = _reproduce("recorded-pushes", "--recorded", str(_imported()))
     found = _run(*words)
     figure = FIGURES / "engine-errors.svg"
     figure.parent.mkdir(exist_ok=True)
@@ -212,7 +217,7 @@ def _identified_row(group: str, found: dict[str, Any]) -> str:
 
 
 def _regularisation() -> str:
-    words = ("reproduce", "regularisation", "--scale", "paper", "--out", str(RUNS))
+    words = _reproduce("regularisation")
     found = _run(*words)
     scores = [f"| {c['l2']:g} | {c['score']:.4f} |" for c in found["choices"]]
     least = min(found["choices"], key=lambda choice: choice["score"])
@@ -245,7 +250,7 @@ _KIND = (
 
 
 def _control() -> str:
-    words = ("reproduce", "simulated-control", "--scale", "paper", "--out", str(RUNS))
+    words = _reproduce("simulated-control")
     return (
         f"`sainet {' '.join(words)}`: 100 goals each (50 with nominal properties alone "
         "and 50 with three disks), Bullet with noise as the world, disks of 0.9 and "

@@ -5,8 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sainet.datasets.store import open_store
 from sainet.errors import BadInput
-from sainet.experiments import load_experiment, recorded_efficiency, recorded_pushes
+from sainet.experiments import (
+    fine_tuning,
+    load_experiment,
+    recorded_efficiency,
+    recorded_pushes,
+)
 from sainet.experiments.recorded_models import Variant, surfaces_of
 from sainet.models.card import read_card
 from sainet.runs import read_json
@@ -104,6 +110,29 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
     tuned = [card for name, card in cards.items() if name.endswith("sain-tuned")]
     assert {card.started_from for card in tuned} == {tuned[0].started_from} != {None}
     assert len({card.data for card in cards.values()}) == 8  # no two saw the same
+
+
+@pytest.mark.slow
+def test_ways_to_tune_are_compared_where_pushes_end(make, monkeypatch, tmp_path):
+    one = {"learning_rate": 1e-3, "l2": 1e-6, "linear_from": 0.5, "mirror": True}
+    monkeypatch.setattr(fine_tuning, "choices_of", lambda: iter([one]))
+    monkeypatch.setattr(fine_tuning, "_ITERATIONS", {"quick": 1})
+    for name in ("_TRAINING", "_TESTS"):
+        monkeypatch.setattr(fine_tuning, name, {"quick": 4})
+    table = make("fine-tuning")
+    rows = {row["model"]: row for row in table["rows"]}
+    assert rows.keys() == {"physics", "sain-stroke", "sain-tuned"}
+    ratios = [
+        rows["sain-tuned"][key] / rows["physics"][key]
+        for key in ("final_pos_mm", "final_rot_deg")
+    ]
+    (choice,) = table["choices"]
+    assert choice == one | {"score": pytest.approx(np.mean(ratios))}
+    seen = open_store(tmp_path / "fine-tuning" / "tests").read(slice(None))
+    assert seen["pose_observed"].sum(axis=1).tolist() == [1] * 4
+    last = seen["pose_observed"][np.arange(4), seen["steps"] - 1]
+    assert last.tolist() == [1] * 4
+    assert set(seen["pusher_friction"].tolist()) == {0.25}
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Going on from a trained network: on few pushes, known at their ends alone."""
 
+import shutil
 from dataclasses import replace
 
 import jax
@@ -170,6 +171,10 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     dynamics = load_dynamics(str(out)).dynamics
     assert dynamics.engine == identified_engine(values)
     fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
+    lost = shutil.copytree(out, tmp_path / "lost")
+    write_json(lost / "card.json", card.to_dict() | {"assumed": None})
+    with pytest.raises(BadCheckpoint, match="assumed is missing"):
+        load_dynamics(str(lost))
     with pytest.raises(BadCheckpoint, match="inner_engine is 'identified'"):
         fit("sain", store, TUNING, tmp_path / "no", start_from=str(out))
     task = Task("sain", store, TUNING, find_assumed_engine(str(tmp_path / "engine")))

@@ -27,7 +27,6 @@ def make_folds(
     store: Store,
     count: int,
     part: Int[np.ndarray, " some"] | None = None,
-    seed: int = 0,
 ) -> list[Fold]:
     """Divide a store into folds of nearly one size; repeats stay together.
 
@@ -36,10 +35,9 @@ def make_folds(
         count: of the folds.
         part: the pushes to take alone, tested and trained on; they are in the same
             fold whatever part is taken.
-        seed: of the draw.
     """
     rows = np.arange(store.info.pushes) if part is None else part
-    owner = fold_of_push(store.repeats(), count, seed)[rows]
+    owner = fold_of_push(store.repeats(), count)[rows]
     return [
         Fold(
             number,

@@ -1,8 +1,9 @@
 """How to fine-tune on few pushes, chosen on simulated ones that stand in for real ones.
 
 The stand-in is a robot that nobody has identified: pushes and disk of the recorded
-ones, but simulated, with three times the usual noise and a friction of contact that
-the engine inside the model does not know; each push is seen at its ends alone.
+ones, but simulated, with three times the usual noise (the pusher does not tremble, see
+`strokes`) and a friction of contact that the engine inside the model does not know;
+each push is seen at its ends alone.
 """
 
 from collections.abc import Iterator

@@ -112,6 +112,11 @@ def _made_of(inner_engine: str) -> str:
 def _inner_engine(folder: Path, card: Card, engine: str | None) -> AssumedProperties:
     """Return the engine with what the network was trained to believe of the scene."""
     own, assumed = card.inner_engine, card.assumed or {}
+    if own == IDENTIFIED and not assumed:
+        raise BadCheckpoint(
+            f"{folder / CARD}: inner_engine is {own!r}, but assumed is missing, so it "
+            "is not known what was identified; train it again."
+        )
     if own == IDENTIFIED and engine in (None, "planar"):
         return engine_of_beliefs(assumed)
     if own not in (*ASSUMED_ENGINES, IDENTIFIED):

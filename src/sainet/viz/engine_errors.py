@@ -50,29 +50,18 @@ def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
 
 def _draw_table(axes: Axes, case: "EndOffsets") -> None:
     place, offset = 1000 * case.place, 1000 * case.offset
-    cell = np.floor(place / _CELL).astype(int)
     axes.plot(*place.T, ".", color=INK, alpha=0.25, markersize=2)
-    kinds, kind = np.unique(cell, axis=0, return_inverse=True)
-    for number, corner in enumerate(kinds):
-        here = np.flatnonzero(kind.ravel() == number)
-        if len(here) >= _FEWEST:
-            _arrow(axes, _CELL * (corner + 0.5), offset[here].mean(axis=0))
-    corner = place.min(axis=0) - [0, 0.8 * _CELL]
-    _arrow(axes, corner, np.array([_SHOWN, 0.0]))
-    axes.text(corner[0], corner[1] + 2, f"{_SHOWN:g} mm", fontsize=8)
-    axes.autoscale_view()
+    cells, owner = np.unique(np.floor(place / _CELL), axis=0, return_inverse=True)
+    members = [np.flatnonzero(owner.ravel() == cell) for cell in range(len(cells))]
+    full = [cell for cell, rows in enumerate(members) if len(rows) >= _FEWEST]
+    if full:
+        means = np.array([offset[members[cell]].mean(axis=0) for cell in full])
+        middles = _CELL * (cells[full] + 0.5)
+        look = {"angles": "xy", "scale_units": "xy", "scale": 1 / _ARROW}
+        arrows = axes.quiver(*middles.T, *means.T, color=PUSHED, width=0.006, **look)
+        axes.quiverkey(arrows, 0.12, 0.04, _SHOWN, f"{_SHOWN:g} mm", labelpos="E")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_ylabel("y of the disk (mm)")
-
-
-def _arrow(axes: Axes, at: np.ndarray, what: np.ndarray) -> None:
-    axes.annotate(
-        "",
-        xy=tuple(at + _ARROW * what),
-        xytext=tuple(at),
-        arrowprops={"arrowstyle": "-|>", "color": PUSHED, "shrinkA": 0, "shrinkB": 0},
-    )
-    axes.update_datalim([at, at + _ARROW * what])
 
 
 def _draw_directions(axes: Axes, case: "EndOffsets") -> None:
