@@ -30,9 +30,8 @@ STROKES = GenerateConfig(
     stroke_mm=(50.0,),
     speed_mm_s=(10.0, 50.0),
     direction_deg=80.0,
-    gap_mm=1.0,
     hold_steps=40,
-    noise=NoiseConfig(tracking_mm=0.0),
+    noise=NoiseConfig(tracking_mm=0.0, calibration_mm=1.0),
 )
 RECIPE = FitConfig(iterations=3000, batch_size=50, halve_every=750, steps=10_000)
 SIZES = {"quick": (20, 20), "paper": (STROKES.pushes, RECIPE.iterations)}
