@@ -33,7 +33,7 @@ def report(iteration, loss):
         time.sleep(600)
 
 config = FitConfig(
-    iterations={ITERATIONS}, batch_size=6, log_every=5, checkpoint_every=10
+    iterations={ITERATIONS}, batch_size=6, average=10, log_every=5, checkpoint_every=10
 )
 fit("sain", open_store(data), config, out, on_step=report)
 """

@@ -1,5 +1,7 @@
 """One gradient step: loss, gradient, devices, schedule, l2 and guards, taken apart."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -263,3 +265,25 @@ def test_statistics_are_finite_whatever_the_pushes_lack(change, bodies):
     scales = feature_scales(batch, network("sain", "robot").sizes)
     found = (scales, loss_weights(batch, FitConfig()))
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
+
+
+def test_the_mean_of_the_weights_is_that_of_tensorflow():
+    config, batch = FitConfig(average=4, learning_rate=1e-2), batch_of()
+    step, plain = (
+        make_step(config, WEIGHTS),
+        make_step(replace(config, average=0), WEIGHTS),
+    )
+    state = first_state(network("sain", "robot"), config)
+    alone = first_state(network("sain", "robot"), replace(config, average=0))
+    mean = trained_layers(alone.network)
+    for done in range(12):
+        state, alone = step(state, batch)[0], plain(alone, batch)[0]
+        keep = min(1 - 1 / 4, (1 + done) / (10 + done))
+        mean = jax.tree.map(
+            lambda old, new, keep=keep: keep * old + (1 - keep) * new,
+            mean,
+            trained_layers(alone.network),
+        )
+    assert_same_tree(trained_layers(state.network), trained_layers(alone.network), 0)
+    assert_same_tree(trained_layers(state.result), mean, 1e-5)
+    assert alone.result is alone.network

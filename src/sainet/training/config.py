@@ -56,6 +56,10 @@ class FitConfig:
     mirror: bool = False
     """Show about half of the pushes of each batch mirrored, others each time: disks on
     an even table know no left and right. Not to networks that see the place."""
+    average: int = 0
+    """Iterations that the weights are averaged over, by an exponential mean: the mean
+    is then the network. A long stroke feels every step of the weights, which jump about
+    what is best; 0: the network has the last weights."""
     validation_share: float = 0.0
     """Share of the pushes, drawn at random, that is kept for validation; the network
     is then the one that was best on them."""
@@ -81,7 +85,8 @@ class FitConfig:
             value = getattr(self, name)
             require_option(math.isfinite(value) and value > 0, name, "positive", value)
         weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
-        for name in ("l2", *weights, "linear_from", "patience", "seed"):
+        others = ("linear_from", "average", "patience", "seed")
+        for name in ("l2", *weights, *others):
             value = getattr(self, name)
             require_option(
                 math.isfinite(value) and value >= 0, name, "0 or more", value

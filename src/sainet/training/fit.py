@@ -139,7 +139,7 @@ class Progress:
     @property
     def network(self) -> InteractionNetwork:
         """The network that training would end with now."""
-        network = self.state.network
+        network = self.state.result
         return network if self.best is None else self.best.put_into(network)
 
 
@@ -182,7 +182,7 @@ def _log_line(
 ) -> None:
     line = {"iteration": iteration, "loss": loss}
     if validate is not None and progress.best is not None:
-        network = progress.state.network
+        network = progress.state.result
         line["validation_loss"] = validate(network)
         progress.best = progress.best.or_better(
             network, line["validation_loss"], iteration

@@ -28,6 +28,14 @@ class FitState(eqx.Module):
     network: InteractionNetwork
     optimizer: Any
     iteration: Array
+    average: Trained | None = None  # of the layers, where that is asked for
+
+    @property
+    def result(self) -> InteractionNetwork:
+        """The network that training would end with now."""
+        if self.average is None:
+            return self.network
+        return with_layers(self.network, self.average)
 
 
 def make_optimizer(config: FitConfig) -> optax.GradientTransformation:
@@ -53,8 +61,22 @@ def with_layers(network: InteractionNetwork, layers: Trained) -> InteractionNetw
 
 def first_state(network: InteractionNetwork, config: FitConfig) -> FitState:
     """Return the state before the first iteration."""
-    optimizer = make_optimizer(config).init(trained_layers(network))
-    return FitState(network, optimizer, jnp.zeros((), jnp.int32))
+    layers = trained_layers(network)
+    optimizer = make_optimizer(config).init(layers)
+    average = layers if config.average else None
+    return FitState(network, optimizer, jnp.zeros((), jnp.int32), average)
+
+
+def _averaged(
+    average: Trained, layers: Trained, config: FitConfig, done: Array
+) -> Trained:
+    """Return the exponential mean, over fewer iterations while there are few.
+
+    It must not remember for long how training began: the share of the new is that of
+    TensorFlow's `ExponentialMovingAverage` with `num_updates`.
+    """
+    share = jnp.maximum(1 / config.average, 9 / (10 + done))
+    return optax.incremental_update(layers, average, share)
 
 
 def data_loss(
@@ -138,8 +160,13 @@ def make_step(
         change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
         mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, change)
         updates, moments = optimizer.update(mean, state.optimizer, layers)
-        network = with_layers(state.network, optax.apply_updates(layers, updates))
-        return FitState(network, moments, state.iteration + 1), total / pushes
+        layers = optax.apply_updates(layers, updates)
+        average = state.average
+        if average is not None:
+            average = _averaged(average, layers, config, state.iteration)
+        network = with_layers(state.network, layers)
+        after = FitState(network, moments, state.iteration + 1, average)
+        return after, total / pushes
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)

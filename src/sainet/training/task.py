@@ -36,6 +36,7 @@ _LATER = {
     "terms": "motion",
     "linear_from": 0.0,
     "mirror": False,
+    "average": 0,
     "validation_share": 0.0,
     "patience": 0,
 }
