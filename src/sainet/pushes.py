@@ -154,3 +154,24 @@ def force_controls(
         force=jnp.broadcast_to(force * heading[..., None, :], (*batch, steps, 2)),
         contact_offset=state.pusher_position - state.position[..., 0, :],
     )
+
+
+def move_pusher(
+    initial: State, controls: Controls, offset: Float[Array, "*batch 2"]
+) -> tuple[State, Controls]:
+    """Return the same pushes with the pusher, and all that it does, elsewhere.
+
+    Args:
+        initial: the states that the pushes start from.
+        controls: of the pushes.
+        offset: how far to move the pusher, m; one for all or one for each push.
+    """
+    here = jnp.broadcast_to(offset, initial.pusher_position.shape)
+    moved = eqx.tree_at(
+        lambda s: s.pusher_position, initial, initial.pusher_position + here
+    )
+    if isinstance(controls, ForceControls):
+        contact = controls.contact_offset + here
+        return moved, eqx.tree_at(lambda c: c.contact_offset, controls, contact)
+    path = controls.position + here[..., None, :]
+    return moved, eqx.tree_at(lambda c: c.position, controls, path)

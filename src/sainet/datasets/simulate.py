@@ -26,6 +26,7 @@ from sainet.pushes import (
     Push,
     contact_normal,
     force_controls,
+    move_pusher,
     path_controls,
     place_pusher,
     push_direction,
@@ -75,7 +76,9 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     world = _with_friction_field(scene, noise, rng)
     actual = _disturb(controls, noise, rng, scene.time_step)
     truth, pusher = _rollout(make_engine(config.engine), world, initial, actual)
-    seen, told = _as_seen(initial, controls, offset)
+    # It is the camera that knows where the disks are: beside them the pusher is then
+    # elsewhere than the robot has it.
+    seen, told = move_pusher(initial, controls, -offset)
     simulated = {
         simulated_name(name): _rollout(make_assumed_engine(name), scene, seen, told)[0]
         for name in config.assumed_engine
@@ -139,24 +142,6 @@ def _commands(
             initial, heading, force=config.force_n, steps=info.steps
         )
     return scene, initial, controls, _steps(config, draws.stroke, draws.speed)
-
-
-def _as_seen(
-    initial: State, controls: Controls, offset: Array
-) -> tuple[State, Controls]:
-    """Return a push as a camera sees it that has everything moved by an offset.
-
-    It is the camera that knows where the disks are; beside them the pusher is then
-    elsewhere than the robot says.
-    """
-    seen = eqx.tree_at(
-        lambda s: s.pusher_position, initial, initial.pusher_position - offset
-    )
-    if isinstance(controls, ForceControls):
-        moved = controls.contact_offset - offset
-        return seen, eqx.tree_at(lambda c: c.contact_offset, controls, moved)
-    path = controls.position - offset[:, None]
-    return seen, eqx.tree_at(lambda c: c.position, controls, path)
 
 
 def _scene(config: GenerateConfig, draws: Draws) -> Scene:

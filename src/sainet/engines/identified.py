@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from sainet.engines.assumed import AssumedProperties
+from sainet.engines.camera import OffsetCamera
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput
 from sainet.runs import read_json
@@ -14,7 +15,8 @@ FILE = "identified.json"
 IDENTIFIED = "identified"  # the name of such an engine on a network's card
 FRICTIONS = ("pusher_friction", "disk_friction", "table_friction")
 RATIO = "pressure_radius_ratio"
-NAMES = (*FRICTIONS, RATIO)
+CAMERA = ("camera_x_mm", "camera_y_mm")  # where it sees things minus the robot's
+NAMES = (*FRICTIONS, RATIO, *CAMERA)
 USUAL_RATIO = 2 / 3  # of a pressure that is uniform
 
 
@@ -38,15 +40,19 @@ def beliefs_of(values: Mapping[str, float]) -> dict[str, Any]:
         "friction": values.get("table_friction"),
         "pusher_friction": values.get("pusher_friction"),
         "disk_friction": values.get("disk_friction"),
-        RATIO: values.get(RATIO),
+        **{name: values.get(name) for name in (RATIO, *CAMERA)},
     }
 
 
 def engine_of_beliefs(beliefs: Mapping[str, Any]) -> AssumedProperties:
     """Return the engine that believes so: what `beliefs_of` returns."""
     ratio = beliefs.get(RATIO)
+    planar = PlanarEngine(pressure_radius_ratio=USUAL_RATIO if ratio is None else ratio)
+    camera = [beliefs.get(name) for name in CAMERA]
     return AssumedProperties(
-        PlanarEngine(pressure_radius_ratio=USUAL_RATIO if ratio is None else ratio),
+        OffsetCamera(planar, *[offset or 0.0 for offset in camera])
+        if any(camera)
+        else planar,
         mass=None,
         radius=None,
         friction=beliefs.get("friction"),
@@ -80,10 +86,16 @@ def read_values(folder: Path) -> dict[str, float]:
     if not isinstance(values, dict) or not values:
         raise BadInput(f"{path}: values is missing; run 'sainet identify' again.")
     for name, value in values.items():
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if name not in NAMES or not (number and math.isfinite(value) and value > 0):
+        if not (name in NAMES and _is_number(value) and (name in CAMERA or value > 0)):
+            kind = "a number" if name in CAMERA else "a positive number"
             raise BadInput(
-                f"{path}: values.{name} is {value!r}; it must be a positive number "
-                f"for one of {', '.join(NAMES)}. Run 'sainet identify' again."
+                f"{path}: values.{name} is {value!r}; it must be {kind} for one of "
+                f"{', '.join(NAMES)}. Run 'sainet identify' again."
             )
     return values
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value)

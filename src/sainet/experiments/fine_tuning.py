@@ -1,9 +1,9 @@
 """How to fine-tune on few pushes, chosen on simulated ones that stand in for real ones.
 
 The stand-in is a robot that nobody has identified: pushes and disk of the recorded
-ones, but simulated, with three times the usual noise (the pusher does not tremble, see
-`strokes`) and a friction of contact that the engine inside the model does not know;
-each push is seen at its ends alone.
+ones, but simulated, with three times the usual noise of friction and of capture, a
+camera that is not calibrated better than that of `strokes`, and a friction of contact
+that the engine inside the model does not know; each push is seen at its ends alone.
 """
 
 from collections.abc import Iterator
@@ -17,6 +17,7 @@ from sainet.datasets.derive import Arrays, derive
 from sainet.datasets.recorded import simulate
 from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.datasets.store import Store
+from sainet.engines.config import at_level
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import join
@@ -27,9 +28,9 @@ from sainet.training.config import FINE_TUNING
 
 START = "sain-stroke"
 LEARNING_RATES = (3e-4, 1e-3)
-L2 = (1e-6, 3e-2)
 LINEAR_FROM = (0.0, 0.5)
 MIRROR = (False, True)
+AVERAGE = (0, 100)
 _BELIEVED, _TRUE = 0.25, 0.4  # friction of contact
 _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
 _ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
@@ -69,10 +70,9 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
 
 def choices_of() -> Iterator[dict[str, Any]]:
     """Yield the settings that are considered, each with a value of its own."""
-    for values in product(LEARNING_RATES, L2, LINEAR_FROM, MIRROR):
-        yield dict(
-            zip(("learning_rate", "l2", "linear_from", "mirror"), values, strict=True)
-        )
+    names = ("learning_rate", "linear_from", "mirror", "average")
+    for values in product(LEARNING_RATES, LINEAR_FROM, MIRROR, AVERAGE):
+        yield dict(zip(names, values, strict=True))
 
 
 def _score(rows: list[dict[str, Any]]) -> float:
@@ -94,7 +94,10 @@ def _stand_in(name: str, pushes: int, seed: int, chain: Chain) -> Store:
             contact_friction=(_TRUE,),
             speed_mm_s=(20.0,),
             hold_steps=0,
-            noise_level="paper-like",
+            noise=replace(
+                at_level(STROKES.noise, "paper-like"),
+                calibration_mm=STROKES.noise.calibration_mm,
+            ),
         ),
     )
     settings = {"believed_friction": _BELIEVED, "observed": "ends"}

@@ -9,6 +9,10 @@ pressure is even, as of a flat disk, where Bullet's disks rest on their rims. An
 pusher does not tremble: the tracking error of the simulated robot (0.2 mm, 0.1 s) has a
 velocity of some 14 mm/s, which a push at 50 mm/s hardly feels, and which at 10 mm/s
 shakes friction away and halves the rotation of the disk.
+
+Robot and camera do not agree to a millimetre about where things are, as those of the
+recorded pushes do not (their README), and the pusher is placed by what the camera sees:
+a gap that is seen at the start is this error and no gap, and is there at the end, too.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +24,7 @@ from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.training.config import FitConfig, ModelKind
 
-# The recorded directions go to 80 degrees, and the pusher starts a millimetre away.
+# The recorded directions go to 80 degrees.
 STROKES = GenerateConfig(
     disks=1,
     pushes=2000,

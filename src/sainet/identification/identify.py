@@ -9,12 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.store import Store
-from sainet.engines.identified import FILE
+from sainet.engines.identified import FILE, NAMES
 from sainet.errors import BadStore
 from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     BOUNDS,
     Estimate,
+    doubt,
     names_for,
     starting_values,
 )
@@ -26,9 +27,6 @@ from sainet.identification.residuals import (
 )
 from sainet.identification.solve import solve
 from sainet.runs import open_run, read_json, write_json
-
-_VAGUE = 3.0  # ratio of the ends of an interval, from which a value is not told
-_AT_BOUND = 1.01  # ratio to it
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def identify_into(store: Store, out: Path) -> dict[str, Any]:
         RunConflict: the folder holds something else.
         BadStore: see `identify`.
     """
-    settings = {"command": "identify", "data": store.content}
+    settings = {"command": "identify", "data": store.content, "parameters": NAMES}
     check_store(store)
     folder = open_run(out, settings, finished_by=FILE)
     if not folder.is_finished:
@@ -76,7 +74,7 @@ def check_store(store: Store) -> None:
 
 
 def identify(store: Store) -> Identified:
-    """Fit contact friction, table friction and pressure distribution.
+    """Fit frictions, pressure distribution and where the camera sees the disks.
 
     Nonlinear least squares (SciPy, robust against outliers) on position and rotation at
     the observed steps, each measured by how wrong the engine is at the start. The 95 %
@@ -101,8 +99,8 @@ def identify(store: Store) -> Identified:
         free = [name for name in start if name not in doubtful]
         values = solve(start, free, scale, parts)
         known = intervals(values, free, scale, parts)
-        doubts = {name: _doubt(name, values[name], *known[name]) for name in free}
-        new = {n: (doubt, known[n]) for n, doubt in doubts.items() if doubt}
+        doubts = {name: doubt(name, values[name], *known[name]) for name in free}
+        new = {name: (why, known[name]) for name, why in doubts.items() if why}
         if not new:
             break
         doubtful, values = doubtful | new, start
@@ -127,18 +125,8 @@ def _estimate(
     known: Mapping[str, tuple[float, float]],
     doubtful: Mapping[str, tuple[str, tuple[float, float]]],
 ) -> Estimate:
-    doubt, interval = doubtful.get(name, (None, known.get(name, BOUNDS[name])))
-    return Estimate(name, value, *interval, start, doubt)
-
-
-def _doubt(name: str, value: float, low: float, high: float) -> str | None:
-    """Say why the data cannot tell a parameter, if they cannot."""
-    least, most = BOUNDS[name]
-    if value < least * _AT_BOUND or value > most / _AT_BOUND:
-        return f"it is at the end of what is looked at, {least:g} to {most:g}"
-    if high > _VAGUE * low:
-        return f"anything from {low:.2g} to {high:.2g} does as well"
-    return None
+    why, interval = doubtful.get(name, (None, known.get(name, BOUNDS[name])))
+    return Estimate(name, value, *interval, start, why)
 
 
 def _raw_errors(values: Mapping[str, float], part: Sample) -> np.ndarray:

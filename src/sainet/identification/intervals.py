@@ -5,7 +5,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from sainet.identification.parameters import BOUNDS
+from sainet.identification.parameters import (
+    bounds_of,
+    from_coordinate,
+    to_coordinate,
+)
 from sainet.identification.residuals import Sample, Scale, residuals, slopes
 
 _RESAMPLES = 2_000
@@ -21,20 +25,20 @@ def intervals(
     parts: Sequence[Sample],
 ) -> dict[str, tuple[float, float]]:
     """Return the 95 % interval of each free parameter, over pushes like these."""
-    logs = {name: float(np.log(value)) for name, value in values.items()}
+    at = {name: to_coordinate(name, value) for name, value in values.items()}
     matrices, vectors = [], []
     for part in parts:
-        error, slope = residuals(logs, scale, part), slopes(logs, free, scale, part)
+        error, slope = residuals(at, scale, part), slopes(at, free, scale, part)
         weight = 1 / np.sqrt(1 + error**2)  # of the soft l1 loss
         matrices.append(np.einsum("pn,pni,pnj->pij", weight, slope, slope))
         vectors.append(np.einsum("pn,pni,pn->pi", weight, slope, error))
     steps = _resampled_steps(np.concatenate(matrices), np.concatenate(vectors))
-    found = {}
-    for index, name in enumerate(free):
-        draws = np.clip(logs[name] - steps[:, index], *np.log(BOUNDS[name]))
-        low, high = np.exp(np.percentile(draws, _INTERVAL))
-        found[name] = (float(low), float(high))
-    return found
+    draws = np.clip(np.array([at[name] for name in free]) - steps, *bounds_of(free))
+    ends = np.percentile(draws, _INTERVAL, axis=0).tolist()
+    return {
+        name: (from_coordinate(name, low), from_coordinate(name, high))
+        for name, low, high in zip(free, *ends, strict=True)
+    }
 
 
 def _resampled_steps(

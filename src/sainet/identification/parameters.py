@@ -1,17 +1,28 @@
-"""The parameters of the planar engine that pushes may tell."""
+"""The parameters of the planar engine, and of its camera, that pushes may tell."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.engines.identified import FRICTIONS, NAMES, RATIO, USUAL_RATIO
+from sainet.engines.base import AbstractEngine
+from sainet.engines.camera import OffsetCamera
+from sainet.engines.identified import CAMERA, FRICTIONS, NAMES, RATIO, USUAL_RATIO
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.scene import Scene
 
-BOUNDS = {**dict.fromkeys(FRICTIONS, (0.01, 2.0)), RATIO: (0.1, 1.0)}
+BOUNDS = {
+    **dict.fromkeys(FRICTIONS, (0.01, 2.0)),
+    RATIO: (0.1, 1.0),
+    **dict.fromkeys(CAMERA, (-5.0, 5.0)),
+}
+_VAGUE = 3.0  # ratio of the ends of an interval, from which a value is not told
+_VAGUE_MM = 2.0  # their difference, of an offset
+_AT_BOUND = 0.01  # share of a bound, so near to which a value is at it
 
 
 @dataclass(frozen=True)
@@ -26,6 +37,48 @@ class Estimate:
     doubt: str | None = None  # why the data cannot tell it, if so
 
 
+def to_coordinate(name: str, value: float) -> float:
+    """Return where a value lies on the line that it is looked for on.
+
+    That of its logarithm; an offset, which has a sign, is looked for itself.
+    """
+    return value if name in CAMERA else math.log(value)
+
+
+def from_coordinate(name: str, coordinate: float) -> float:
+    """Return the value at a coordinate."""
+    return coordinate if name in CAMERA else math.exp(coordinate)
+
+
+def values_at(coordinates: Mapping[str, Float[Array, ""]]) -> dict[str, Array]:
+    """Return values at coordinates, all in JAX."""
+    return {n: x if n in CAMERA else jnp.exp(x) for n, x in coordinates.items()}
+
+
+def bounds_of(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the greatest coordinate of each parameter."""
+    found = [[to_coordinate(name, end) for end in BOUNDS[name]] for name in names]
+    low, high = np.array(found).T
+    return low, high
+
+
+def doubt(name: str, value: float, low: float, high: float) -> str | None:
+    """Say why the data cannot tell a parameter, if they cannot.
+
+    Args:
+        name: of the parameter.
+        value: where the errors are least.
+        low: end of the 95 % interval.
+        high: its other end.
+    """
+    least, most = BOUNDS[name]
+    if value - least < _AT_BOUND * abs(least) or most - value < _AT_BOUND * most:
+        return f"it is at the end of what is looked at, {least:g} to {most:g}"
+    if high - low > _VAGUE_MM if name in CAMERA else high > _VAGUE * low:
+        return f"anything from {low:.2g} to {high:.2g} does as well"
+    return None
+
+
 def names_for(scene: Scene) -> tuple[str, ...]:
     """Return the parameters that can matter: one disk touches no other."""
     lone = scene.body_count == 1
@@ -35,12 +88,13 @@ def names_for(scene: Scene) -> tuple[str, ...]:
 def starting_values(scene: Scene, names: tuple[str, ...]) -> dict[str, float]:
     """Return what the scenes say, on average."""
     known = {name: float(jnp.mean(getattr(scene, name))) for name in FRICTIONS}
-    return {name: (known | {RATIO: USUAL_RATIO})[name] for name in names}
+    known |= {RATIO: USUAL_RATIO, **dict.fromkeys(CAMERA, 0.0)}
+    return {name: known[name] for name in names}
 
 
 def with_values(
     scene: Scene, values: Mapping[str, Float[Array, ""]]
-) -> tuple[Scene, PlanarEngine]:
+) -> tuple[Scene, AbstractEngine]:
     """Return scenes and an engine with these values; differentiable in them."""
     frictions = [name for name in FRICTIONS if name in values]
     changed = eqx.tree_at(
@@ -48,4 +102,5 @@ def with_values(
         scene,
         [jnp.broadcast_to(values[n], getattr(scene, n).shape) for n in frictions],
     )
-    return changed, PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO))
+    planar = PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO))
+    return changed, OffsetCamera(planar, *[values.get(name, 0.0) for name in CAMERA])

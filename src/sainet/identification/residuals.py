@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
-from sainet.identification.parameters import with_values
+from sainet.identification.parameters import values_at, with_values
 
 _LOOKS = 8  # observed poses of a push that are compared, evenly over it
 _BATCH = 256  # pushes at a time
@@ -78,8 +78,7 @@ def pose_errors(
 def _residual(
     free: dict, fixed: dict, sizes: Array, batch: PushBatch, steps: Array
 ) -> Array:
-    values = {name: jnp.exp(value) for name, value in (free | fixed).items()}
-    error = pose_errors(values, batch, steps)
+    error = pose_errors(values_at(free | fixed), batch, steps)
     scaled = error / jnp.broadcast_to(sizes, error.shape)
     # A push counts once, however often it was looked at.
     return scaled.reshape(len(scaled), -1) / jnp.sqrt(1.0 * steps.shape[1])
@@ -89,31 +88,31 @@ _slope = eqx.filter_jit(jax.jacfwd(_residual))
 
 
 def residuals(
-    log_values: Mapping[str, float], scale: Scale, sample: Sample
+    coordinates: Mapping[str, float], scale: Scale, sample: Sample
 ) -> Float[np.ndarray, "push number"]:
     """Return the scaled errors of each push."""
-    found = _residual(*_arguments(log_values, (), scale, sample))
+    found = _residual(*_arguments(coordinates, (), scale, sample))
     return np.asarray(found, np.float64)
 
 
 def slopes(
-    log_values: Mapping[str, float],
+    coordinates: Mapping[str, float],
     free: Sequence[str],
     scale: Scale,
     sample: Sample,
 ) -> Float[np.ndarray, "push number parameter"]:
     """Return derivatives by the free parameters, forward through the engine."""
-    found = _slope(*_arguments(log_values, free, scale, sample))
+    found = _slope(*_arguments(coordinates, free, scale, sample))
     return np.stack([np.asarray(found[name], np.float64) for name in free], axis=-1)
 
 
 def _arguments(
-    log_values: Mapping[str, float],
+    coordinates: Mapping[str, float],
     free: Sequence[str],
     scale: Scale,
     sample: Sample,
 ) -> tuple[dict, dict, Array, PushBatch, Array]:
-    tree = {name: jnp.float32(value) for name, value in log_values.items()}
+    tree = {name: jnp.float32(value) for name, value in coordinates.items()}
     chosen = {name: tree.pop(name) for name in free}
     sizes = jnp.array([scale.position, scale.position, scale.rotation], jnp.float32)
     return chosen, tree, sizes, sample.batch, jnp.asarray(sample.steps)

@@ -66,6 +66,9 @@ _ASSUMED: dict[str, _Check] = {
         ("pusher_friction", "disk_friction", "pressure_radius_ratio"),
         (_or_none(lambda v: _is_number(v) and v > 0), "a positive number or null"),
     ),
+    **dict.fromkeys(
+        ("camera_x_mm", "camera_y_mm"), (_or_none(_is_number), "a number or null")
+    ),
 }
 
 

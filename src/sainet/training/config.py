@@ -109,6 +109,7 @@ FINE_TUNING = FitConfig(
     terms="error",
     linear_from=0.5,
     mirror=True,
+    average=100,
     validation_share=0.2,
     patience=300,
     log_every=25,
