@@ -81,8 +81,9 @@ def _ship(name: str, chain: "Chain", folder: str, into: Path) -> None:
 
 
 def whole_card(card: "Card") -> dict[str, Any]:
-    """Return a card with the settings that came after its training: their defaults."""
-    return card.to_dict() | {"config": asdict(FitConfig()) | card.config}
+    """Return a card with the settings of now: those that came later by default."""
+    now = asdict(FitConfig())
+    return card.to_dict() | {"config": {n: card.config.get(n, now[n]) for n in now}}
 
 
 if __name__ == "__main__":

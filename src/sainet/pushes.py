@@ -156,22 +156,20 @@ def force_controls(
     )
 
 
-def move_pusher(
-    initial: State, controls: Controls, offset: Float[Array, "*batch 2"]
-) -> tuple[State, Controls]:
-    """Return the same pushes with the pusher, and all that it does, elsewhere.
-
-    Args:
-        initial: the states that the pushes start from.
-        controls: of the pushes.
-        offset: how far to move the pusher, m; one for all or one for each push.
-    """
-    here = jnp.broadcast_to(offset, initial.pusher_position.shape)
-    moved = eqx.tree_at(
-        lambda s: s.pusher_position, initial, initial.pusher_position + here
+def move_pusher(state: State, offset: Float[Array, "*batch 2"]) -> State:
+    """Return states with the pusher moved by an offset (m), one or one for each."""
+    moved = state.pusher_position + jnp.broadcast_to(
+        offset, state.pusher_position.shape
     )
+    return eqx.tree_at(lambda s: s.pusher_position, state, moved)
+
+
+def move_controls(controls: Controls, offset: Float[Array, "*batch 2"]) -> Controls:
+    """Return controls of a pusher that is moved by an offset (m)."""
     if isinstance(controls, ForceControls):
+        here = jnp.broadcast_to(offset, controls.contact_offset.shape)
         contact = controls.contact_offset + here
-        return moved, eqx.tree_at(lambda c: c.contact_offset, controls, contact)
-    path = controls.position + here[..., None, :]
-    return moved, eqx.tree_at(lambda c: c.position, controls, path)
+        return eqx.tree_at(lambda c: c.contact_offset, controls, contact)
+    path = controls.position
+    path = path + jnp.broadcast_to(offset[..., None, :], path.shape)
+    return eqx.tree_at(lambda c: c.position, controls, path)

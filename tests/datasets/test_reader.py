@@ -57,6 +57,20 @@ def test_a_batch_holds_what_the_store_holds(store, make_reader):
         np.testing.assert_array_equal(arrays[name], whole[name][chosen])
 
 
+def test_what_is_not_stored_is_added_to_each_chunk_once(store, make_reader):
+    seen = []
+
+    def complete(arrays):
+        seen.append(len(arrays["mass"]))
+        return arrays | {"double": 2 * arrays["mass"]}
+
+    reader = make_reader(store, complete=complete)
+    for iteration in range(10):
+        arrays, _ = reader.batch(iteration)
+        np.testing.assert_array_equal(arrays["double"], 2 * arrays["mass"])
+    assert sum(seen) == PUSHES
+
+
 def test_the_order_depends_on_seed_and_iteration_alone(store, make_reader):
     wanted = first(make_reader(store), 12)
     assert first(make_reader(store), 12) == wanted

@@ -13,8 +13,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
-from sainet.engines.camera import OffsetCamera
-from sainet.engines.identified import FILE, identified_engine, read_identified
+from sainet.engines.identified import FILE, identified_engine, read_values
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput, BadStore, RunConflict
 from sainet.identification.identify import identify, identify_into
@@ -27,6 +26,7 @@ from sainet.identification.parameters import (
 )
 from sainet.identification.residuals import Scale, residuals, samples, slopes
 from sainet.models.registry import load_dynamics
+from sainet.pushes import move_controls, move_pusher
 from training.stores import end_points_alone, info_of, made_up, write
 
 OFFSET = {"camera_x_mm": 0.8, "camera_y_mm": -0.5}
@@ -55,9 +55,11 @@ def store(tmp_path_factory):
     scene, engine = with_values(
         to_scene(arrays, info), {k: jnp.float32(v) for k, v in TRUE.items()}
     )
-    rollout = eqx.filter_jit(engine.rollout)
+    offset = jnp.array([TRUE[name] for name in OFFSET]) / 1000
+    initial = move_pusher(to_initial(arrays), offset)
+    controls = move_controls(to_controls(arrays, info), offset)
     motion, _ = from_trajectory(
-        rollout(scene, to_initial(arrays), to_controls(arrays, info))
+        eqx.filter_jit(engine.rollout)(scene, initial, controls)
     )
     noise = np.random.default_rng(0).normal(size=(*motion.shape[:3], 3))
     motion = motion.copy()
@@ -124,11 +126,12 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
     assert json.loads((out / FILE).read_text()) == result
     model = load_dynamics(str(out))
     assert model.name == "mine"
-    engine = model.dynamics.engine
-    assert engine.pusher_friction == result["values"]["pusher_friction"]
-    assert isinstance(engine.engine, OffsetCamera)
-    assert engine.engine.x_mm == result["values"]["camera_x_mm"]
-    assert isinstance(engine.engine.engine, PlanarEngine)
+    values = result["values"]
+    offset = np.array([values["camera_x_mm"], values["camera_y_mm"]]) / 1000
+    np.testing.assert_allclose(model.dynamics.offset, offset)
+    engine = model.dynamics.dynamics.engine
+    assert engine.pusher_friction == values["pusher_friction"]
+    assert isinstance(engine.engine, PlanarEngine)
     with pytest.raises(BadInput, match="of the planar engine, not of bullet"):
         load_dynamics(str(out), engine="bullet")
     before = (out / FILE).stat().st_mtime_ns
@@ -152,7 +155,7 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
 def test_a_damaged_file_is_named(tmp_path, text, says):
     (tmp_path / FILE).write_text(text)
     with pytest.raises(BadInput, match=says):
-        read_identified(tmp_path)
+        read_values(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Batches of stored pushes in a random order that the iteration alone decides."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -9,26 +10,31 @@ import numpy as np
 
 from sainet.datasets.store import Store
 
+Arrays = dict[str, np.ndarray]
+
 _WINDOW = 8  # chunks that are shuffled together
 _ORDER_STREAM = 0x0DE5
 
 
 @dataclass
 class ChunkCache:
-    """Chunks of some arrays, as many as fit in memory, the last used ones."""
+    """Chunks of some arrays, as many as fit in memory, the last used ones.
+
+    `complete` adds to a chunk what is not stored but computed.
+    """
 
     store: Store
     names: tuple[str, ...]
     limit: int  # bytes
-    _chunks: OrderedDict[int, dict[str, np.ndarray]] = field(
-        default_factory=OrderedDict
-    )
+    complete: Callable[[Arrays], Arrays] = lambda arrays: arrays  # noqa: E731
+    _chunks: OrderedDict[int, Arrays] = field(default_factory=OrderedDict)
     _size: int = 0
 
-    def get(self, index: int) -> dict[str, np.ndarray]:
+    def get(self, index: int) -> Arrays:
         """Return one chunk, read from disk unless it was used lately."""
         if index not in self._chunks:
-            chunk = self.store.read(self.store.info.chunk_slice(index), self.names)
+            rows = self.store.info.chunk_slice(index)
+            chunk = self.complete(self.store.read(rows, self.names))
             self._chunks[index] = chunk
             self._size += _bytes(chunk)
         self._chunks.move_to_end(index)
@@ -36,10 +42,10 @@ class ChunkCache:
             self._size -= _bytes(self._chunks.popitem(last=False)[1])
         return self._chunks[index]
 
-    def gather(self, pushes: np.ndarray) -> dict[str, np.ndarray]:
+    def gather(self, pushes: np.ndarray) -> Arrays:
         """Return the arrays of some pushes, in their order."""
         owners = pushes // self.store.info.chunk_size
-        picked: dict[str, np.ndarray] = {}
+        picked: Arrays = {}
         for owner in np.unique(owners):
             here = np.flatnonzero(owners == owner)
             rows = pushes[here] - owner * self.store.info.chunk_size
@@ -51,7 +57,7 @@ class ChunkCache:
         return picked
 
 
-def _bytes(chunk: dict[str, np.ndarray]) -> int:
+def _bytes(chunk: Arrays) -> int:
     return sum(array.nbytes for array in chunk.values())
 
 
@@ -60,7 +66,8 @@ class BatchReader:
     """Reads batches of pushes of one length, never the store whole.
 
     Which pushes make up a batch depends on the seed and the iteration alone, so that
-    an interrupted training goes on with the same batches.
+    an interrupted training goes on with the same batches. `complete` adds to a chunk
+    what is not stored but computed.
     """
 
     store: Store
@@ -68,16 +75,17 @@ class BatchReader:
     batch_size: int
     seed: int
     memory: int = 1 << 30  # bytes
+    complete: Callable[[Arrays], Arrays] = lambda arrays: arrays  # noqa: E731
 
     def __post_init__(self) -> None:
         """Look up the lengths and start the thread that reads ahead."""
-        self._cache = ChunkCache(self.store, self.names, self.memory)
+        self._cache = ChunkCache(self.store, self.names, self.memory, self.complete)
         self._steps = self.store.read(slice(None), ("steps",))["steps"]
         self._order = lru_cache(maxsize=2)(self._batches_of_epoch)
         self._thread = ThreadPoolExecutor(1)
         self._ahead: dict[int, object] = {}
 
-    def batch(self, iteration: int) -> tuple[dict[str, np.ndarray], int]:
+    def batch(self, iteration: int) -> tuple[Arrays, int]:
         """Return the arrays of a batch and the number of steps of its pushes."""
         ready = self._ahead.pop(iteration, None)
         ready = ready or self._thread.submit(self._read, iteration)
@@ -88,7 +96,7 @@ class BatchReader:
         """Stop reading ahead."""
         self._thread.shutdown(cancel_futures=True)
 
-    def _read(self, iteration: int) -> tuple[dict[str, np.ndarray], int]:
+    def _read(self, iteration: int) -> tuple[Arrays, int]:
         epoch, place = 0, iteration
         while place >= len(self._order(epoch)):
             whole = len(self._order(epoch))

@@ -26,6 +26,7 @@ from sainet.pushes import (
     Push,
     contact_normal,
     force_controls,
+    move_controls,
     move_pusher,
     path_controls,
     place_pusher,
@@ -78,7 +79,7 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     truth, pusher = _rollout(make_engine(config.engine), world, initial, actual)
     # It is the camera that knows where the disks are: beside them the pusher is then
     # elsewhere than the robot has it.
-    seen, told = move_pusher(initial, controls, -offset)
+    seen, told = move_pusher(initial, -offset), move_controls(controls, -offset)
     simulated = {
         simulated_name(name): _rollout(make_assumed_engine(name), scene, seen, told)[0]
         for name in config.assumed_engine

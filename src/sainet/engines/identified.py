@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from sainet.engines.assumed import AssumedProperties
-from sainet.engines.camera import OffsetCamera
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput
 from sainet.runs import read_json
@@ -47,12 +46,8 @@ def beliefs_of(values: Mapping[str, float]) -> dict[str, Any]:
 def engine_of_beliefs(beliefs: Mapping[str, Any]) -> AssumedProperties:
     """Return the engine that believes so: what `beliefs_of` returns."""
     ratio = beliefs.get(RATIO)
-    planar = PlanarEngine(pressure_radius_ratio=USUAL_RATIO if ratio is None else ratio)
-    camera = [beliefs.get(name) for name in CAMERA]
     return AssumedProperties(
-        OffsetCamera(planar, *[offset or 0.0 for offset in camera])
-        if any(camera)
-        else planar,
+        PlanarEngine(pressure_radius_ratio=USUAL_RATIO if ratio is None else ratio),
         mass=None,
         radius=None,
         friction=beliefs.get("friction"),
@@ -61,18 +56,15 @@ def engine_of_beliefs(beliefs: Mapping[str, Any]) -> AssumedProperties:
     )
 
 
+def camera_offset(beliefs: Mapping[str, Any]) -> tuple[float, float]:
+    """Return where a camera sees things, minus where the robot has them (m)."""
+    x, y = (beliefs.get(name) or 0.0 for name in CAMERA)
+    return x / 1000, y / 1000
+
+
 def is_identified(folder: Path) -> bool:
     """Return whether `sainet identify` left an engine in a folder."""
     return (folder / FILE).is_file()
-
-
-def read_identified(folder: Path) -> AssumedProperties:
-    """Return the engine that `sainet identify` left in a folder.
-
-    Raises:
-        BadInput: the file is damaged or holds no such values.
-    """
-    return identified_engine(read_values(folder))
 
 
 def read_values(folder: Path) -> dict[str, float]:

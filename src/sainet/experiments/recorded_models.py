@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Int
 
 from sainet.datasets.store import Store
-from sainet.engines.identified import read_identified
+from sainet.engines.identified import beliefs_of, engine_of_beliefs, read_values
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.identification.identify import identify_into
+from sainet.models.camera import with_camera
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.named import NamedDynamics
@@ -93,8 +94,9 @@ class Tuner:
     def _around_identified(self, model: NamedDynamics) -> NamedDynamics:
         """Return a network around another engine than it was trained around."""
         network = load_network(network_folder(model.name))[0]
-        engine = read_identified(self._identified())
-        return replace(model, dynamics=SimulatorAugmented(network, engine))
+        beliefs = beliefs_of(read_values(self._identified()))
+        around = SimulatorAugmented(network, engine_of_beliefs(beliefs))
+        return replace(model, dynamics=with_camera(around, beliefs))
 
     def _config(self, variant: Variant) -> FitConfig:
         count = self.training.info.pushes

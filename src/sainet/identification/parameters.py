@@ -9,8 +9,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.engines.base import AbstractEngine
-from sainet.engines.camera import OffsetCamera
 from sainet.engines.identified import CAMERA, FRICTIONS, NAMES, RATIO, USUAL_RATIO
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.scene import Scene
@@ -94,7 +92,7 @@ def starting_values(scene: Scene, names: tuple[str, ...]) -> dict[str, float]:
 
 def with_values(
     scene: Scene, values: Mapping[str, Float[Array, ""]]
-) -> tuple[Scene, AbstractEngine]:
+) -> tuple[Scene, PlanarEngine]:
     """Return scenes and an engine with these values; differentiable in them."""
     frictions = [name for name in FRICTIONS if name in values]
     changed = eqx.tree_at(
@@ -102,5 +100,9 @@ def with_values(
         scene,
         [jnp.broadcast_to(values[n], getattr(scene, n).shape) for n in frictions],
     )
-    planar = PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO))
-    return changed, OffsetCamera(planar, *[values.get(name, 0.0) for name in CAMERA])
+    return changed, PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO))
+
+
+def camera_at(values: Mapping[str, Float[Array, ""]]) -> Float[Array, "2"]:
+    """Return where the camera sees things, minus where the robot has them (m)."""
+    return jnp.stack([values.get(name, jnp.zeros(())) for name in CAMERA]) / 1000

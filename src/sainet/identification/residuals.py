@@ -11,7 +11,8 @@ from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
-from sainet.identification.parameters import values_at, with_values
+from sainet.identification.parameters import camera_at, values_at, with_values
+from sainet.pushes import move_controls, move_pusher
 
 _LOOKS = 8  # observed poses of a push that are compared, evenly over it
 _BATCH = 256  # pushes at a time
@@ -68,7 +69,12 @@ def pose_errors(
 ) -> Float[Array, "push look body 3"]:
     """Return predicted minus observed poses (m, m, rad); differentiable in values."""
     scene, engine = with_values(batch.scene, values)
-    states = engine.rollout(scene, batch.initial, batch.controls).states
+    offset = camera_at(values)
+    start, controls = (
+        move_pusher(batch.initial, offset),
+        move_controls(batch.controls, offset),
+    )
+    states = engine.rollout(scene, start, controls).states
     pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
     looks = steps[:, :, None, None]
     return jnp.take_along_axis(pose - batch.measured, looks, axis=1)

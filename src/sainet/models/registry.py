@@ -7,11 +7,13 @@ from sainet.engines.assumed import AssumedProperties, calibrated
 from sainet.engines.identified import (
     FILE,
     IDENTIFIED,
+    beliefs_of,
     engine_of_beliefs,
     is_identified,
-    read_identified,
+    read_values,
 )
 from sainet.errors import BadCheckpoint, BadInput, UnknownName
+from sainet.models.camera import with_camera
 from sainet.models.card import CARD, Card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import (
@@ -58,7 +60,7 @@ def load_dynamics(
     folder = network_folder(name)
     if is_identified(folder):
         _check_identified(folder, engine)
-        return NamedDynamics(folder.name, PhysicsDynamics(read_identified(folder)))
+        return NamedDynamics(folder.name, _identified_physics(folder))
     network, card = load_network(folder)
     if engine is not None and not force:
         _check_engine(folder, card, engine)
@@ -67,7 +69,13 @@ def load_dynamics(
         dynamics = SimulatorAugmented(network, _inner_engine(folder, card, engine))
     if not card.recurrent:
         dynamics = Restarted(dynamics)
+    dynamics = with_camera(dynamics, card.assumed or {})
     return NamedDynamics(folder.name, dynamics, card, folder)
+
+
+def _identified_physics(folder: Path) -> AbstractDynamics:
+    beliefs = beliefs_of(read_values(folder))
+    return with_camera(PhysicsDynamics(engine_of_beliefs(beliefs)), beliefs)
 
 
 def network_folder(name: str) -> Path:

@@ -6,18 +6,27 @@ from typing import Any
 
 import jax.numpy as jnp
 
-from sainet.datasets.batch import PushBatch
+from sainet.datasets.batch import (
+    PushBatch,
+    from_trajectory,
+    to_controls,
+    to_initial,
+    to_scene,
+)
+from sainet.datasets.reader import Arrays
+from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.engines import ASSUMED_ENGINES, make_assumed_engine
 from sainet.engines.assumed import AssumedProperties, beliefs
 from sainet.engines.base import roll_out
 from sainet.engines.identified import (
     IDENTIFIED,
     beliefs_of,
+    camera_offset,
     engine_of_beliefs,
     is_identified,
     read_values,
 )
-from sainet.scene import pack_motion
+from sainet.pushes import move_controls, move_pusher
 
 
 @dataclass(frozen=True)
@@ -42,10 +51,26 @@ class AssumedEngine:
             return make_assumed_engine(self.name)
         return engine_of_beliefs(self.beliefs)
 
-    def predict(self, batch: PushBatch) -> PushBatch:
-        """Return the batch with this engine's prediction, computed here and now."""
-        trajectory = roll_out(self.make(), batch.scene, batch.initial, batch.controls)
-        return replace(batch, simulated=jnp.asarray(pack_motion(trajectory.states)))
+    def as_seen(self, batch: PushBatch) -> PushBatch:
+        """Return the batch with the pusher where the camera would see it."""
+        offset = jnp.array(camera_offset(self.beliefs))
+        return replace(
+            batch,
+            initial=move_pusher(batch.initial, offset),
+            controls=move_controls(batch.controls, offset),
+        )
+
+    def predict(self, arrays: Arrays, info: StoreInfo) -> Arrays:
+        """Return arrays of a store with this engine's prediction, if it lacks them."""
+        name = simulated_name(self.name)
+        if name in arrays:
+            return arrays
+        offset = jnp.array(camera_offset(self.beliefs))
+        scene = to_scene(arrays, info)
+        initial = move_pusher(to_initial(arrays), offset)
+        controls = move_controls(to_controls(arrays, info), offset)
+        trajectory = roll_out(self.make(), scene, initial, controls)
+        return arrays | {name: from_trajectory(trajectory)[0]}
 
 
 def find_assumed_engine(name: str) -> AssumedEngine:

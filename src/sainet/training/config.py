@@ -102,15 +102,15 @@ class FitConfig:
 # For a network that goes on from another on few recorded pushes: the least error on
 # simulated ones that stand in for them (`sainet reproduce fine-tuning`).
 FINE_TUNING = FitConfig(
-    iterations=1_000,
+    iterations=600,
     batch_size=50,
-    halve_every=250,
+    halve_every=200,
     steps=10_000,
     terms="error",
     linear_from=0.5,
     mirror=True,
     average=100,
     validation_share=0.2,
-    patience=300,
+    patience=200,
     log_every=25,
 )

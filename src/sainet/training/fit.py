@@ -153,7 +153,8 @@ def _iterate(
     on_step: Callable[[int, float], None],
 ) -> None:
     config, history = task.config, progress.history
-    reader = BatchReader(task.training, task.names, config.batch_size, config.seed)
+    size, seed = config.batch_size, config.seed
+    reader = BatchReader(task.training, task.names, size, seed, complete=task.complete)
     try:
         for iteration in range(
             int(progress.state.iteration) + 1, config.iterations + 1

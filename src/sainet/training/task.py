@@ -98,6 +98,10 @@ class Task:
         config = self.config
         return split(self.store.repeats(), config.validation_share, config.seed)
 
+    def complete(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return stored arrays with the prediction that the network sees."""
+        return self.inner.predict(arrays, self.store.info) if self.inner else arrays
+
     def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
         """Turn stored arrays into a batch with what the network sees."""
         return self._batch(arrays, steps, self.inner)
@@ -118,12 +122,14 @@ class Task:
     def _batch(
         self, arrays: dict[str, np.ndarray], steps: int, inner: AssumedEngine | None
     ) -> PushBatch:
-        steps = min(steps, self.config.steps)
-        stored = inner.name if inner and inner.is_stored else None
-        batch = to_batch(arrays, self.store.info, steps=steps, simulated=stored)
+        info, steps = self.store.info, min(steps, self.config.steps)
+        arrays = inner.predict(arrays, info) if inner else arrays
+        seen = inner.name if inner else None
+        batch = to_batch(arrays, info, steps=steps, simulated=seen)
+        batch = inner.as_seen(batch) if inner and not inner.is_stored else batch
         if not self.config.recurrent:
             return to_single_steps(batch, inner.make() if inner else None)
-        return inner.predict(batch) if inner and not inner.is_stored else batch
+        return batch
 
 
 def check_data(task: Task) -> None:

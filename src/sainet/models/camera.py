@@ -1,0 +1,67 @@
+"""Models for a robot and a camera that do not agree about where things are."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sainet.engines.identified import camera_offset
+from sainet.models.dynamics import AbstractDynamics, Purpose
+from sainet.pushes import Controls, move_controls, move_pusher
+from sainet.scene import Scene, State, Trajectory
+
+
+class OffsetCamera(AbstractDynamics):
+    """Wraps a model: the camera sees all things moved from where the robot has them.
+
+    It is the camera that says where the disks are, and the robot where the pusher is.
+    The wrapped model, network and engine, is shown the pusher as the camera would see
+    it; states that are returned have it where the robot does.
+    """
+
+    dynamics: AbstractDynamics
+    offset: tuple[float, float] = eqx.field(static=True)  # m, camera minus robot
+
+    @property
+    def on_host(self) -> bool:
+        """Whether the wrapped model has an engine that works outside JAX."""
+        return self.dynamics.on_host
+
+    @property
+    def made_for(self) -> Purpose | None:
+        """What the network in the wrapped model was made for."""
+        return self.dynamics.made_for
+
+    def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
+        """Start at the state."""
+        return self.dynamics.begin(scene, move_pusher(state, self._offset))
+
+    def advance(
+        self,
+        scene: Scene,
+        carry: Any,  # noqa: ANN401
+        controls: Controls,
+    ) -> tuple[Any, Trajectory]:
+        """Advance the wrapped model."""
+        seen = move_controls(controls, self._offset)
+        carry, trajectory = self.dynamics.advance(scene, carry, seen)
+        return carry, Trajectory(move_pusher(trajectory.states, -self._offset))
+
+    @property
+    def _offset(self) -> Float[Array, "2"]:
+        return jnp.array(self.offset)
+
+
+def with_camera(
+    dynamics: AbstractDynamics, beliefs: Mapping[str, Any]
+) -> AbstractDynamics:
+    """Return a model that knows the offset of the camera, if any is believed in.
+
+    Args:
+        dynamics: the model.
+        beliefs: as a network's card says them (`engines.identified.beliefs_of`).
+    """
+    offset = camera_offset(beliefs)
+    return OffsetCamera(dynamics, offset) if any(offset) else dynamics

@@ -1,0 +1,76 @@
+"""Models that know that the camera sees things elsewhere than the robot has them."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from contracts.worlds import pushed
+from models.samples import network
+from sainet.datasets.config import GenerateConfig
+from sainet.engines.assumed import AssumedProperties
+from sainet.engines.planar.engine import PlanarEngine
+from sainet.models.camera import OffsetCamera, with_camera
+from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.pushes import PathControls
+from sainet.scene import pack_motion
+
+STEPS = 40
+OFFSET = (2e-3, -1e-3)
+
+
+def model_of(name, setup):
+    if name == "physics":
+        return PhysicsDynamics(PlanarEngine())
+    return SimulatorAugmented(network("sain", setup), AssumedProperties(PlanarEngine()))
+
+
+def world(setup):
+    return pushed(GenerateConfig(setup=setup, disks=2, pushes=4), 0, STEPS)
+
+
+@pytest.mark.parametrize("setup", ["robot", "direct-force"])
+@pytest.mark.parametrize("name", ["physics", "sain"])
+def test_all_is_as_if_the_disks_were_where_the_robot_has_them(name, setup):
+    model = model_of(name, setup)
+    scene, initial, controls = world(setup)
+    plain = predict(model, scene, initial, controls)
+    # What the camera tells of it: the disks elsewhere, the pusher where it was.
+    offset = jnp.array(OFFSET)
+    told = eqx.tree_at(
+        lambda s: s.position, initial, initial.position + offset[None, None]
+    )
+    if not isinstance(controls, PathControls):  # from the disk that is seen
+        contact = controls.contact_offset - offset[None]
+        controls = eqx.tree_at(lambda c: c.contact_offset, controls, contact)
+    found = predict(OffsetCamera(model, OFFSET), scene, told, controls)
+    np.testing.assert_allclose(
+        np.asarray(found.states.position) - np.asarray(offset),
+        plain.states.position,
+        atol=5e-6,
+    )
+    for part in ("angle", "velocity", "spin", "pusher_position"):
+        np.testing.assert_allclose(
+            getattr(found.states, part), getattr(plain.states, part), atol=2e-3
+        )
+
+
+def test_two_advances_are_one_long_one():
+    model = OffsetCamera(model_of("sain", "robot"), OFFSET)
+    scene, initial, controls = world("robot")
+    whole = predict(model, scene, initial, controls)
+    carry, parts = model.begin(scene, initial), []
+    for part in (slice(0, 15), slice(15, None)):
+        some = PathControls(controls.position[:, part], controls.velocity[:, part])
+        carry, trajectory = model.advance(scene, carry, some)
+        parts.append(np.asarray(pack_motion(trajectory.states)))
+    found = np.concatenate(parts, axis=1)
+    np.testing.assert_allclose(found, pack_motion(whole.states), atol=2e-5)
+
+
+def test_a_camera_that_agrees_is_no_wrapper():
+    model = PhysicsDynamics(PlanarEngine())
+    for agreed in ({}, {"camera_x_mm": None, "camera_y_mm": 0.0}):
+        assert with_camera(model, agreed) is model
+    found = with_camera(model, {"camera_x_mm": 1.5, "camera_y_mm": None})
+    assert found == OffsetCamera(model, (1.5e-3, 0.0))
