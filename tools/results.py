@@ -17,6 +17,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from sainet.engines.identified import CAMERA
 from sainet.models.registry import OF_STROKES
 from sainet.runs import manifest
 from sainet.training.config import FINE_TUNING, FitConfig
@@ -129,9 +130,10 @@ def _recorded() -> str:
         f"pushes of this kind and none of these.\n\n{to_markdown(_run(*words))}\n"
         "The contact friction of 0.25 is `mu` in a published log of the same robot and "
         "what an earlier sweep on these same pushes chose: it is no blind guess.\n\n"
-        "The same networks on simulated strokes, whose truth is this engine: physics "
-        "is right there, and what a network adds is its own error (`sainet generate "
-        f"{_KIND} {' '.join(made)}`):\n\n{to_markdown(_run(*simulated))}"
+        "The same networks on simulated strokes, whose truth is this engine, seen by a "
+        "camera that is off by a millimetre, which is all that physics is wrong by "
+        f"(`sainet generate {_KIND} {' '.join(made)}`):\n\n"
+        f"{to_markdown(_run(*simulated))}"
     )
 
 
@@ -175,17 +177,18 @@ def _recorded_pushes() -> str:
         "`identified`: around the engine identified on the same training pushes; "
         "`place`: sees where on the table it is.\n\n"
         f"{to_markdown(found)}\n![What the engine gets wrong about real pushes]"
-        f"(figures/{figure.name})\n\nWhat the nominal engine misses of the end of a "
-        "push: by where the disk was, and by the direction of the push on the table."
+        f"(figures/{figure.name})\n\nWhat an engine misses of the end of a "
+        "push: by where the disk was, and by the direction of the push on the table; "
+        "nominal, and identified on these same pushes."
     )
 
 
 def _identified() -> str:
     data = _imported()
     lines = [
-        "| pushes | pusher friction | pressure radius ratio | not told | position (mm) "
-        "| rotation (deg) |",
-        "| :-- | --: | --: | :-- | --: | --: |",
+        f"| pushes | {' | '.join(_told(name) for name in _OF_ONE_DISK)} | not told "
+        "| position (mm) | rotation (deg) |",
+        f"| :-- |{' --: |' * len(_OF_ONE_DISK)} :-- | --: | --: |",
     ]
     for group in (None, "abs-10", "abs-20", "plywood-10"):
         out = RUNS / f"identified-{group or 'all'}"
@@ -195,19 +198,28 @@ def _identified() -> str:
     return (
         f"`sainet identify --data {data} [--group GROUP] --out DIR`: contact friction "
         "(0.25 before), table friction and pressure distribution (0.667, uniform, "
-        "before) of the planar engine, fitted to where the disk ended; 95 % intervals "
-        "over pushes. Errors are mean final errors before and after, on the same "
-        "pushes that were fitted: no test of anything new.\n\n" + "\n".join(lines)
+        "before) of the planar engine, and where the camera sees the disk (mm from "
+        "where the robot has it; 0 before), fitted to where the disk ended; 95 % "
+        "intervals over pushes. Errors are mean final errors before and after, on "
+        "the same pushes that were fitted: no test of anything new.\n\n"
+        + "\n".join(lines)
     )
+
+
+_OF_ONE_DISK = ("pusher_friction", "pressure_radius_ratio", *CAMERA)
+
+
+def _told(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _identified_row(group: str, found: dict[str, Any]) -> str:
     known = {estimate["name"]: estimate for estimate in found["estimates"]}
     cells = [
         "{value:.3f} [{low:.3f}, {high:.3f}]".format(**known[name])
-        for name in ("pusher_friction", "pressure_radius_ratio")
+        for name in _OF_ONE_DISK
     ]
-    doubts = [name.replace("_", " ") for name, e in known.items() if e["doubt"]]
+    doubts = [_told(name) for name, estimate in known.items() if estimate["doubt"]]
     errors = [
         f"{found[f'before_{unit}']:.2f} to {found[f'after_{unit}']:.2f}"
         for unit in ("mm", "deg")
@@ -245,7 +257,7 @@ def _choice(choices: list[dict[str, float]]) -> str:
 
 _KIND = (
     "robot --disks 1 --mass-kg 0.85 0.95 --radius-mm 52.5 --stroke-mm 50 "
-    "--direction-deg 80 --gap-mm 1 --hold-steps 40 --tracking-mm 0"
+    "--direction-deg 80 --hold-steps 40 --tracking-mm 0 --calibration-mm 1"
 )
 
 

@@ -16,7 +16,6 @@ def test_an_offset_ahead_is_along_and_one_to_the_left_is_across():
     found = EndOffsets(np.zeros((3, 2)), heading, offset, np.zeros(3))
     np.testing.assert_allclose(found.along, 1.0)
     np.testing.assert_allclose(found.across, 2.0)
-    assert found.of_pushes(np.array([1])).offset.tolist() == [[-2.0, 1.0]]
 
 
 def test_its_size_is_the_error_of_the_evaluation(tmp_path):

@@ -19,10 +19,6 @@ class EndOffsets:
     offset: Float[np.ndarray, "push 2"]  # m, observed minus predicted, on the table
     turn: Float[np.ndarray, " push"]  # rad, likewise
 
-    def of_pushes(self, rows: np.ndarray) -> "EndOffsets":
-        """Return those of some pushes."""
-        return EndOffsets(**{name: value[rows] for name, value in vars(self).items()})
-
     @property
     def along(self) -> Float[np.ndarray, " push"]:
         """The offset along the push, m."""

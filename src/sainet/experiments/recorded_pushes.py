@@ -16,7 +16,7 @@ import numpy as np
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import Evaluation
 from sainet.evaluation.folds import Fold, fold_of_push, join_folds, make_folds
-from sainet.evaluation.offsets import end_offsets
+from sainet.evaluation.offsets import EndOffsets, end_offsets
 from sainet.evaluation.rows import comparison_rows
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
@@ -28,7 +28,6 @@ from sainet.experiments.recorded_models import (
     Variant,
     surfaces_of,
 )
-from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
 from sainet.training.config import Features, ModelKind
 from sainet.viz.engine_errors import draw_engine_errors
@@ -92,10 +91,20 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     table = join(tables)
     table["published"] = [row for one in tables for row in one.get("published", ())]
     write_json(chain.out / "table.json", table)
-    offsets = end_offsets(load_dynamics("physics"), store)
-    cases = {name: offsets.of_pushes(rows) for name, rows in surfaces_of(store).items()}
+    cases = dict(_engine_errors(store, scale, chain))
     draw_engine_errors(cases, chain.out / "engine-errors.svg")
     return table
+
+
+def _engine_errors(
+    store: Store, scale: Scale, chain: Chain
+) -> Iterator[tuple[str, EndOffsets]]:
+    """Yield what engines get wrong on each surface: nominal, and identified on it."""
+    for surface, rows in surfaces_of(store).items():
+        pushes = store.take(rows)
+        tuner = Tuner(pushes, f"{surface}/whole", scale, chain)
+        for engine, model in zip(("", ", identified"), tuner.physics(), strict=True):
+            yield f"{surface}{engine}", end_offsets(model, pushes)
 
 
 def _by_surface(fold: Fold, surface: str, scale: Scale, chain: Chain) -> Evaluation:

@@ -21,7 +21,7 @@ _SHOWN = 2.0  # mm, the arrow that explains the scale
 
 
 def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
-    """Draw what an engine misses: a row for each surface.
+    """Draw what engines miss: a row for each surface and engine.
 
     Left: the mean vector from where the engine says that the disk ends to where it
     ended, by where the disk was before. Right: that vector along the push and to its
@@ -29,7 +29,7 @@ def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
     An engine of even friction that knows it would leave no arrow and two level lines.
 
     Args:
-        cases: by the name of the surface.
+        cases: by the name of surface and engine.
         path: where to write; ``.svg`` or ``.png``.
     """
     with house_look():
@@ -40,6 +40,7 @@ def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
         for (name, case), (table, direction) in zip(cases.items(), panels, strict=True):
             _draw_table(table, case)
             table.set_title(f"{name}: where on the table")
+            direction.sharey(panels[0][1])
             _draw_directions(direction, case)
             direction.set_title(f"{name}: in which direction")
         panels[-1][0].set_xlabel("x of the disk (mm)")
