@@ -107,7 +107,6 @@ FINE_TUNING = FitConfig(
     halve_every=200,
     steps=10_000,
     terms="error",
-    linear_from=0.5,
     mirror=True,
     average=100,
     validation_share=0.2,
