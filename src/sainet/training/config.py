@@ -100,7 +100,8 @@ class FitConfig:
 
 
 # For a network that goes on from another on few recorded pushes: the least error on
-# simulated ones that stand in for them (`sainet reproduce fine-tuning`).
+# simulated ones that stand in for them, or level with it (`sainet reproduce
+# fine-tuning`).
 FINE_TUNING = FitConfig(
     iterations=600,
     batch_size=50,
