@@ -208,8 +208,9 @@ def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
     arrays = task.validation.read(slice(None), task.names)
     batch = task.to_batch(arrays, task.store.info.steps)
     known = int(batch.is_observed.sum())
-    loss = jax.jit(lambda network: data_loss(network, batch, weights) / known)
-    return lambda network: float(loss(network))
+    # Arguments all: XLA would spend seconds on folding what a function holds.
+    loss = jax.jit(data_loss)
+    return lambda network: float(loss(network, batch, weights)) / known
 
 
 def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
