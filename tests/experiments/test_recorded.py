@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sainet.datasets.store import open_store
+from sainet.engines.identified import FILE
 from sainet.errors import BadInput
 from sainet.experiments import (
     fine_tuning,
@@ -15,7 +16,7 @@ from sainet.experiments import (
 )
 from sainet.experiments.recorded_models import Variant, surfaces_of
 from sainet.models.card import read_card
-from sainet.runs import read_json
+from sainet.runs import read_json, write_json
 from sainet.training.config import FINE_TUNING
 from training.stores import end_points_alone, info_of, made_up, write
 
@@ -45,6 +46,13 @@ def recorded(tmp_path):
     return write(tmp_path / "recorded", info, arrays)
 
 
+def identify(store, folder):
+    """Stands in for identification: the first push decides what is found."""
+    found = 0.2 + 0.1 * float(store.read(slice(1), ("mass",))["mass"][0, 0])
+    values = {"pusher_friction": found, "camera_x_mm": 1.0}
+    write_json(folder / FILE, {"values": values})
+
+
 @pytest.fixture
 def make(chain, recorded, monkeypatch, tmp_path):
     monkeypatch.setattr(recorded_pushes, "VARIANTS", FEW)
@@ -57,6 +65,8 @@ def make(chain, recorded, monkeypatch, tmp_path):
     # Of one size, so that everything compiles once.
     few = replace(FINE_TUNING, batch_size=4)
     monkeypatch.setattr(f"{models}.FINE_TUNING", few)
+    # It has tests of its own, and compiles for a minute.
+    monkeypatch.setattr(f"{models}.identify_into", identify)
     whole = replace(chain, recorded=recorded.path)
     return lambda name: load_experiment(name)(
         "quick", replace(whole, out=tmp_path / name)
