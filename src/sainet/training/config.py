@@ -103,7 +103,7 @@ class FitConfig:
 # simulated ones that stand in for them, or level with it (`sainet reproduce
 # fine-tuning`).
 FINE_TUNING = FitConfig(
-    iterations=600,
+    iterations=800,
     batch_size=50,
     halve_every=200,
     steps=10_000,
@@ -111,6 +111,6 @@ FINE_TUNING = FitConfig(
     mirror=True,
     average=100,
     validation_share=0.2,
-    patience=200,
+    patience=250,
     log_every=25,
 )
