@@ -131,9 +131,9 @@ def _recorded() -> str:
         f"pushes of this kind and none of these.\n\n{to_markdown(_run(*words))}\n"
         "The contact friction of 0.25 is `mu` in a published log of the same robot and "
         "what an earlier sweep on these same pushes chose: it is no blind guess.\n\n"
-        "The same networks on simulated strokes, whose truth is this engine, seen by a "
-        "camera that is off by a millimetre, which is all that physics is wrong by "
-        f"(`sainet generate {_KIND} {' '.join(made)}`):\n\n"
+        "The same networks on simulated strokes, whose truth is this engine: physics "
+        "is right there, and what a network adds is its own error (`sainet generate "
+        f"{_KIND} {' '.join(made)}`):\n\n"
         f"{to_markdown(_run(*simulated))}"
     )
 
@@ -155,9 +155,9 @@ def _tuning() -> str:
         f"`sainet {' '.join(words)}`: `sain-stroke` tuned on 200 simulated pushes, of "
         "which the ends alone are seen, of a robot whose friction of contact (0.4) the "
         "engine does not know (0.25), with three times the usual noise of friction and "
-        "capture and a camera that is calibrated to a millimetre; compared on 300 "
-        "others. The score is the mean error over that of physics, one training "
-        "each.\n\n"
+        "capture and one recording in twenty that failed; compared on 300 others, "
+        "where none did. The score is the mean error over that of physics, one "
+        "training each.\n\n"
         + "\n".join(lines)
         + f"\n\nThe defaults of `--start-from` have {chosen:.4f}, the least is "
         f"{min(scores.values()):.4f}."
@@ -286,7 +286,7 @@ def _choice(choices: list[dict[str, float]]) -> str:
 
 _KIND = (
     "robot --disks 1 --mass-kg 0.85 0.95 --radius-mm 52.5 --stroke-mm 50 "
-    "--direction-deg 80 --hold-steps 40 --tracking-mm 0 --calibration-mm 1"
+    "--direction-deg 80 --gap-mm 1 --hold-steps 40 --tracking-mm 0"
 )
 
 

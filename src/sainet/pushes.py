@@ -92,20 +92,11 @@ def push_axis(state: State) -> Float[Array, "*batch"]:
     return direction(state.position[..., 1, :] - state.position[..., 0, :])
 
 
-def contact_normal(state: State, push: Push) -> Float[Array, "*batch 2"]:
-    """Return the unit vector from where the pusher starts to the middle of disk 1."""
-    return unit(push_axis(state) + push.contact_angle)
-
-
 def place_pusher(
-    scene: Scene,
-    state: State,
-    push: Push,
-    *,
-    gap: float | Float[Array, "*batch"] = 0.0,
+    scene: Scene, state: State, push: Push, *, gap: float = 0.0
 ) -> Float[Array, "*batch 2"]:
     """Return where the pusher starts (m): on disk 1, `gap` away from its surface."""
-    normal = contact_normal(state, push)
+    normal = unit(push_axis(state) + push.contact_angle)
     reach = scene.radius[..., 0] + scene.pusher_radius + gap
     return state.position[..., 0, :] - reach[..., None] * normal
 

@@ -2,23 +2,13 @@
 
 from functools import lru_cache
 
-import equinox as eqx
 import numpy as np
 import pytest
 
 from datasets.stores import small
-from sainet.datasets import simulate
-from sainet.datasets.batch import (
-    from_trajectory,
-    to_batch,
-    to_controls,
-    to_initial,
-    to_scene,
-)
+from sainet.datasets.batch import to_batch, to_controls, to_initial, to_scene
 from sainet.datasets.schema import sizes, variables
 from sainet.datasets.simulate import simulate_chunk, store_info
-from sainet.engines import make_engine
-from sainet.engines.base import roll_out
 from sainet.pushes import ForceControls, PathControls
 from sainet.scene import TIME_STEP, pair_gaps, pusher_gaps
 
@@ -58,47 +48,6 @@ def test_pushes_start_at_rest_and_in_touch(setup):
     assert np.abs(pair_gaps(scene, initial)[:, 0, 1]).max() < 1e-7
     assert not np.asarray(initial.velocity).any()
     assert not np.asarray(initial.spin).any()
-
-
-@both_setups
-def test_the_pusher_is_placed_where_the_camera_sees_the_disk(setup, monkeypatch):
-    offset = np.array([0.5e-3, -2e-3])
-    draw = lambda rng, pushes, noise: np.tile(offset, (pushes, 1))  # noqa: E731
-    monkeypatch.setattr(simulate, "calibration_error", draw)
-    config = small(
-        setup=setup, force_steps=30, chunk_size=12, noise_level="none", **AS_ASSUMED
-    )
-    arrays, info = simulate_chunk(config, 0), store_info(config)
-    scene, seen = to_scene(arrays, info), to_initial(arrays)
-    away = np.asarray(seen.position[:, 0] - seen.pusher_position)
-    normal = away / np.linalg.norm(away, axis=1, keepdims=True)
-    gap = np.asarray(pusher_gaps(scene, seen))[:, 0]
-    # The disk gives way to a pusher that it is in the way of; else there is a gap that
-    # the camera does not see.
-    assert 0 < np.mean(gap > 1e-4) < 1
-    robot_away = away - offset
-    true_gap = np.linalg.norm(robot_away, axis=1) - np.linalg.norm(away, axis=1) + gap
-    np.testing.assert_allclose(np.minimum(gap, true_gap), 0, atol=5e-5)
-    np.testing.assert_allclose(gap - true_gap, normal @ offset, atol=5e-5)
-    # Truth is what the engine does where the robot says that things are.
-    moved = eqx.tree_at(
-        lambda s: s.pusher_position, seen, seen.pusher_position + offset[None]
-    )
-    controls = to_controls(arrays, info)
-    if isinstance(controls, PathControls):
-        controls = eqx.tree_at(
-            lambda c: c.position, controls, controls.position + offset[None, None]
-        )
-    else:
-        controls = eqx.tree_at(
-            lambda c: c.contact_offset, controls, controls.contact_offset + offset[None]
-        )
-    wanted, pusher = from_trajectory(
-        roll_out(make_engine("planar"), scene, moved, controls)
-    )
-    np.testing.assert_allclose(arrays["truth"][..., :3], wanted[..., :3], atol=2e-6)
-    np.testing.assert_allclose(arrays["truth_pusher"], pusher - offset, atol=2e-6)
-    assert np.abs(arrays["simulated_planar"] - arrays["truth"])[..., :2].max() > 5e-4
 
 
 @both_setups

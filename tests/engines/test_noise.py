@@ -8,7 +8,6 @@ import pytest
 
 from sainet.engines.config import NoiseConfig, at_level
 from sainet.engines.noise import (
-    calibration_error,
     capture_error,
     force_error,
     friction_features,
@@ -17,7 +16,7 @@ from sainet.engines.noise import (
 )
 from sainet.scene import TIME_STEP, FrictionField
 
-NOISE = NoiseConfig(calibration_mm=1.0)
+NOISE = NoiseConfig()
 
 
 def generator():
@@ -94,21 +93,12 @@ def test_capture_error_has_its_sizes_and_is_white():
     assert after == pytest.approx(0, abs=0.02)
 
 
-def test_calibration_error_has_its_size_and_draws_nothing_where_there_is_none():
-    error = calibration_error(generator(), 20_000, NOISE)
-    np.testing.assert_allclose(error.std(axis=0), 1e-3, rtol=0.03)
-    rng = generator()
-    assert not calibration_error(rng, 3, replace(NOISE, calibration_mm=0.0)).any()
-    assert rng.random() == generator().random()
-
-
 SIZES = (
     "tracking_mm",
     "force_fraction",
     "friction_fraction",
     "capture_mm",
     "capture_deg",
-    "calibration_mm",
 )
 
 
@@ -128,5 +118,4 @@ def test_no_noise_is_zero():
     assert not tracking_error(generator(), moving, none, TIME_STEP).any()
     assert not force_error(generator(), np.ones((3, 20, 2)), none, TIME_STEP).any()
     assert not capture_error(generator(), (3, 20, 2), none).any()
-    assert not calibration_error(generator(), 3, none).any()
     assert not friction_features(generator(), 3, none)["amplitude"].any()

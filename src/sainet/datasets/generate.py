@@ -5,7 +5,6 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.sampling import chunk_generator, draw
@@ -51,7 +50,9 @@ def generate(
         MissingExtra: an engine needs a package that is not installed.
     """
     _check_possible(config)
-    folder = open_run(out, _settings(config), finished_by=HASHES)
+    folder = open_run(
+        out, {"command": "generate", **asdict(config)}, finished_by=HASHES
+    )
     if folder.is_finished:
         _log.info("%s is finished already", out)
         clear_progress(out)
@@ -65,14 +66,6 @@ def generate(
         on_pushes(_length(info, index))
     finish(out, info)
     return open_store(out)
-
-
-def _settings(config: GenerateConfig) -> dict[str, Any]:
-    """Return what decides the bytes, as JSON values."""
-    settings = {"command": "generate", **asdict(config)}
-    if not config.noise.calibration_mm:  # came later: a folder from before lacks it
-        del settings["noise"]["calibration_mm"]
-    return settings
 
 
 def _check_possible(config: GenerateConfig) -> None:

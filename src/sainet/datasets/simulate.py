@@ -3,7 +3,6 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 
 from sainet.datasets.batch import from_trajectory
 from sainet.datasets.config import GenerateConfig, bounds
@@ -13,7 +12,6 @@ from sainet.engines import make_assumed_engine, make_engine
 from sainet.engines.base import AbstractEngine, roll_out
 from sainet.engines.config import NoiseConfig, at_level
 from sainet.engines.noise import (
-    calibration_error,
     capture_error,
     force_error,
     friction_features,
@@ -24,10 +22,7 @@ from sainet.pushes import (
     ForceControls,
     PathControls,
     Push,
-    contact_normal,
     force_controls,
-    move_controls,
-    move_pusher,
     path_controls,
     place_pusher,
     push_direction,
@@ -71,26 +66,24 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     rng = chunk_generator(config.seed, index)
     # Always a whole chunk, so that the last one compiles nothing of its own.
     draws = draw(config, rng, config.chunk_size)
+    scene, initial, controls, steps = _commands(config, info, draws)
     noise = at_level(config.noise, config.noise_level)
-    offset = jnp.asarray(calibration_error(rng, config.chunk_size, noise), jnp.float32)
-    scene, initial, controls, steps = _commands(config, info, draws, offset)
     world = _with_friction_field(scene, noise, rng)
     actual = _disturb(controls, noise, rng, scene.time_step)
     truth, pusher = _rollout(make_engine(config.engine), world, initial, actual)
-    # It is the camera that knows where the disks are: beside them the pusher is then
-    # elsewhere than the robot has it.
-    seen, told = move_pusher(initial, -offset), move_controls(controls, -offset)
     simulated = {
-        simulated_name(name): _rollout(make_assumed_engine(name), scene, seen, told)[0]
+        simulated_name(name): _rollout(
+            make_assumed_engine(name), scene, initial, controls
+        )[0]
         for name in config.assumed_engine
     }
     pose = truth[..., :3]
     arrays = {
-        **_scene_arrays(scene, seen, told),
+        **_scene_arrays(scene, initial, controls),
         "steps": steps,
         "group": np.zeros(config.chunk_size),
         "truth": truth,
-        "truth_pusher": pusher - np.asarray(offset)[:, None],
+        "truth_pusher": pusher,
         "measured": pose + capture_error(rng, pose.shape[:3], noise),
         "pose_observed": np.ones(pose.shape[:2]),
         "rate_observed": np.ones(pose.shape[:2]),
@@ -117,7 +110,7 @@ def _steps(
 
 
 def _commands(
-    config: GenerateConfig, info: StoreInfo, draws: Draws, offset: Array
+    config: GenerateConfig, info: StoreInfo, draws: Draws
 ) -> tuple[Scene, State, Controls, np.ndarray]:
     scene = _scene(config, draws)
     position = jnp.asarray(draws.position, jnp.float32)
@@ -128,10 +121,7 @@ def _commands(
         length=jnp.asarray(draws.stroke, jnp.float32),
         speed=jnp.asarray(draws.speed, jnp.float32),
     )
-    # Placed by what the camera sees; a disk that is in the way has been pushed aside.
-    further = jnp.sum(offset * contact_normal(resting, push), axis=-1)
-    gap = jnp.maximum(config.gap_mm / 1000 - further, 0.0)
-    start = place_pusher(scene, resting, push, gap=gap)
+    start = place_pusher(scene, resting, push, gap=config.gap_mm / 1000)
     heading = push_direction(resting, push)
     initial = at_rest(position, resting.angle, start)
     if config.setup == "robot":

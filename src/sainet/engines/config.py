@@ -25,10 +25,6 @@ class NoiseConfig:
     """Error of the motion capture's positions, white, in mm."""
     capture_deg: float = 0.1
     """Error of the motion capture's angles, white, in degrees."""
-    calibration_mm: float = 0.0
-    """How far the camera sees the disks from where the robot has them, the same during
-    a push: standard deviation in mm along each axis. The robot places the pusher where
-    the camera sees the disk's edge. Not of the default world."""
 
 
 def at_level(noise: NoiseConfig, level: NoiseLevel) -> NoiseConfig:
@@ -41,5 +37,4 @@ def at_level(noise: NoiseConfig, level: NoiseLevel) -> NoiseConfig:
         friction_fraction=factor * noise.friction_fraction,
         capture_mm=factor * noise.capture_mm,
         capture_deg=factor * noise.capture_deg,
-        calibration_mm=factor * noise.calibration_mm,
     )

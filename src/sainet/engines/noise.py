@@ -87,18 +87,6 @@ def friction_features(
     }
 
 
-def calibration_error(
-    rng: np.random.Generator, pushes: int, noise: NoiseConfig
-) -> Float[np.ndarray, "push 2"]:
-    """Draw where the camera sees things, minus where the robot has them (m).
-
-    Nothing is drawn where there is none, so that a world without is what it was.
-    """
-    if not noise.calibration_mm:
-        return np.zeros((pushes, 2))
-    return rng.standard_normal((pushes, 2)) * noise.calibration_mm / 1000
-
-
 def capture_error(
     rng: np.random.Generator, shape: tuple[int, int, int], noise: NoiseConfig
 ) -> Float[np.ndarray, "push time body 3"]:

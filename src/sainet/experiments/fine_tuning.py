@@ -1,11 +1,10 @@
 """How to fine-tune on few pushes, chosen on simulated ones that stand in for real ones.
 
 The stand-in is a robot that nobody has identified: pushes and disk of the recorded
-ones, but simulated, with three times the usual noise of friction and of capture, a
-camera that is not calibrated better than that of `strokes`, and a friction of contact
-that the engine inside the model does not know; each push is seen at its ends alone.
-One recording in twenty fails: the disk is seen elsewhere than where it ended. What is
-to be told is where it ended, so that no test fails.
+ones, but simulated, with three times the usual noise (the pusher does not tremble, see
+`strokes`) and a friction of contact that the engine inside the model does not know;
+each push is seen at its ends alone. One recording in twenty fails: the disk is seen
+elsewhere than where it ended. What is to be told is where it ended, so no test fails.
 """
 
 from collections.abc import Iterator
@@ -19,7 +18,6 @@ from sainet.datasets.derive import Arrays, derive
 from sainet.datasets.recorded import simulate
 from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.datasets.store import Store
-from sainet.engines.config import at_level
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import join
@@ -98,10 +96,7 @@ def _stand_in(name: str, pushes: int, seed: int, chain: Chain) -> Store:
             contact_friction=(_TRUE,),
             speed_mm_s=(20.0,),
             hold_steps=0,
-            noise=replace(
-                at_level(STROKES.noise, "paper-like"),
-                calibration_mm=STROKES.noise.calibration_mm,
-            ),
+            noise_level="paper-like",
         ),
     )
     failed = _FAILED if name == "training" else 0.0

@@ -9,10 +9,6 @@ pressure is even, as of a flat disk, where Bullet's disks rest on their rims. An
 pusher does not tremble: the tracking error of the simulated robot (0.2 mm, 0.1 s) has a
 velocity of some 14 mm/s, which a push at 50 mm/s hardly feels, and which at 10 mm/s
 shakes friction away and halves the rotation of the disk.
-
-Robot and camera do not agree to a millimetre about where things are, as those of the
-recorded pushes do not (their README), and the pusher is placed by what the camera sees:
-a gap that is seen at the start is this error and no gap, and is there at the end, too.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +20,7 @@ from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.training.config import FitConfig, ModelKind
 
-# The recorded directions go to 80 degrees.
+# The recorded directions go to 80 degrees, and the pusher starts a millimetre away.
 STROKES = GenerateConfig(
     disks=1,
     pushes=2000,
@@ -34,8 +30,9 @@ STROKES = GenerateConfig(
     stroke_mm=(50.0,),
     speed_mm_s=(10.0, 50.0),
     direction_deg=80.0,
+    gap_mm=1.0,
     hold_steps=40,
-    noise=NoiseConfig(tracking_mm=0.0, calibration_mm=1.0),
+    noise=NoiseConfig(tracking_mm=0.0),
 )
 RECIPE = FitConfig(iterations=3000, batch_size=50, halve_every=750, steps=10_000)
 SIZES = {"quick": (20, 20), "paper": (STROKES.pushes, RECIPE.iterations)}

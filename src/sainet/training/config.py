@@ -100,16 +100,16 @@ class FitConfig:
 
 
 # For a network that goes on from another on few recorded pushes: the least error on
-# simulated ones that stand in for them, or level with it (`sainet reproduce
-# fine-tuning`).
+# simulated ones that stand in for them (`sainet reproduce fine-tuning`).
 FINE_TUNING = FitConfig(
     iterations=800,
     batch_size=50,
+    learning_rate=3e-4,
     halve_every=200,
     steps=10_000,
     terms="error",
+    linear_from=0.5,
     mirror=True,
-    average=100,
     validation_share=0.2,
     patience=250,
     log_every=25,
