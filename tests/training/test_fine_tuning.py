@@ -7,16 +7,19 @@ import jax
 import numpy as np
 import pytest
 
-from sainet.datasets.batch import to_batch
+from sainet.datasets.batch import to_batch, to_controls, to_initial
 from sainet.engines.identified import beliefs_of, identified_engine
 from sainet.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
+from sainet.models.dynamics import predict
+from sainet.models.frame import push_frame
 from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
 from sainet.scene import pack_motion
 from sainet.training import fit as fit_module
 from sainet.training.assumed import find_assumed_engine
+from sainet.training.batch import path_to_frame, predict_batch
 from sainet.training.best import Best
 from sainet.training.config import FINE_TUNING, FitConfig
 from sainet.training.fit import fit
@@ -160,7 +163,7 @@ def test_repeats_are_validated_on_together_or_not_at_all(tmp_path):
 
 def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     """Its prediction is computed: the store has none, and the card says it all."""
-    values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5}
+    values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5, "camera_x_mm": 1.5}
     write_json(tmp_path / "engine" / "identified.json", {"values": values})
     words = {"assumed_engine": str(tmp_path / "engine")}
     out = tmp_path / "out"
@@ -168,8 +171,9 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     card = read_card(out)
     assert card.inner_engine == "identified"
     assert card.assumed == beliefs_of(values)
-    dynamics = load_dynamics(str(out)).dynamics
-    assert dynamics.engine == identified_engine(values)
+    model = load_dynamics(str(out)).dynamics
+    assert model.offset == (1.5e-3, 0.0)
+    assert model.dynamics.engine == identified_engine(values)
     fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
     lost = shutil.copytree(out, tmp_path / "lost")
     write_json(lost / "card.json", card.to_dict() | {"assumed": None})
@@ -187,6 +191,16 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     np.testing.assert_allclose(
         batch.simulated, pack_motion(wanted.states), rtol=1e-4, atol=1e-6
     )
+    moved = np.asarray(batch.initial.pusher_position) - arrays["initial_pusher"]
+    np.testing.assert_allclose(moved, [[1.5e-3, 0]] * 4, atol=1e-7)
+    # What training predicts is what the model does with what was recorded.
+    controls = to_controls(arrays, store.info, slice(12))
+    found = predict(model, batch.scene, to_initial(arrays), controls)
+    local = path_to_frame(
+        pack_motion(found.states), push_frame(batch.scene, batch.initial)
+    )
+    trained = predict_batch(load_network(out)[0], batch)
+    np.testing.assert_allclose(local, trained, rtol=1e-3, atol=2e-5)
 
 
 def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):
