@@ -104,12 +104,12 @@ class FitConfig:
 FINE_TUNING = FitConfig(
     iterations=800,
     batch_size=50,
-    learning_rate=3e-4,
     halve_every=200,
     steps=10_000,
     terms="error",
     linear_from=0.5,
     mirror=True,
+    average=100,
     validation_share=0.2,
     patience=250,
     log_every=25,
