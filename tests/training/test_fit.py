@@ -228,7 +228,7 @@ def test_some_pushes_have_to_remain_for_training(store, tmp_path):
 AT_LEAST_ONE = ("iterations", "batch_size", "halve_every", "steps")
 AT_LEAST_ONE += ("log_every", "checkpoint_every")
 NOT_NEGATIVE = ("l2", "weight_position", "weight_rotation", "weight_velocity")
-NOT_NEGATIVE += ("weight_spin", "validation_share", "patience", "seed")
+NOT_NEGATIVE += ("weight_spin", "validation_share", "patience", "average", "seed")
 BAD = [(name, bad) for name in AT_LEAST_ONE for bad in (0, -3)]
 BAD += [(n, bad) for n in ("learning_rate", "clip_norm") for bad in (0.0, -1.0)]
 BAD += [(name, -1) for name in NOT_NEGATIVE]
