@@ -160,7 +160,7 @@ def shown(*words):
 def test_going_on_from_a_network_has_defaults_of_its_own():
     usual, tuned = shown("train", "in"), shown("train", "in", "--start-from", "in")
     assert "Number of gradient steps. (default: 10000)" in usual
-    assert "Number of gradient steps. (default: 1000)" in tuned
+    assert "Number of gradient steps. (default: 800)" in tuned
     assert "(default: error)" in tuned
     assert shown("train", "in", "--start-from=in") == tuned
 

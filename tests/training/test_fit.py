@@ -165,8 +165,8 @@ def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch
     readers = []
     reader = fit_module.BatchReader
 
-    def small(*args):
-        readers.append(reader(*args, memory=chunk))
+    def small(*args, **words):
+        readers.append(reader(*args, **words, memory=chunk))
         return readers[-1]
 
     monkeypatch.setattr(fit_module, "BatchReader", small)
