@@ -13,7 +13,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
-from sainet.engines.identified import FILE, identified_engine, read_values
+from sainet.engines.identified import FILE, beliefs_of, engine_of_beliefs, read_values
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput, BadStore, RunConflict
 from sainet.identification.identify import identify, identify_into
@@ -148,6 +148,11 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
         ('{"values": {"pusher_friction": -1}}', "values.pusher_friction is -1"),
         ('{"values": {"grip": 0.3}}', "values.grip"),
         ('{"values": {"pusher_friction": true}}', "pusher_friction is True"),
+        ('{"values": {"pressure_radius_ratio": 0}}', "0; it must be a positive number"),
+        (
+            '{"values": {"table_friction": 1%s}}' % ("0" * 400),
+            "it must be a positive number",
+        ),
         ('{"values": {"camera_x_mm": "a"}}', "camera_x_mm is 'a'; it must be a number"),
         ("{", "cannot be read as JSON"),
     ],
@@ -176,8 +181,16 @@ def test_a_wide_interval_is_doubted(name, value, low, high, says):
     assert from_coordinate(name, to_coordinate(name, value)) == pytest.approx(value)
 
 
+def test_scenes_without_friction_are_refused_and_nothing_stays(store, tmp_path):
+    arrays = store.read(slice(None)) | {"table_friction": np.zeros(24, np.float32)}
+    slippery = write(tmp_path / "data", store.info, arrays)
+    with pytest.raises(BadStore, match="table_friction is 0; .* around a friction"):
+        identify_into(slippery, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_what_is_not_identified_is_the_scenes():
-    engine = identified_engine({"pusher_friction": 0.3})
+    engine = engine_of_beliefs(beliefs_of({"pusher_friction": 0.3}))
     scene = with_values(samples_scene(), {})[0]
     believed = engine.assume(scene)
     np.testing.assert_allclose(believed.pusher_friction, 0.3)

@@ -131,7 +131,7 @@ BAD_FIELDS = {
         *({"mass": bad} for bad in ([True, 1], [float("1e999")], [[1.0]])),
         *({"radius": bad} for bad in ("wide", [], ["x"], [0.05, 0], [-0.05], {})),
         *({"friction": bad} for bad in ("ice", -0.1, [0.1], True, float("1e999"))),
-        *({"pressure_radius_ratio": bad} for bad in (0, "even", True)),
+        *({"pressure_radius_ratio": bad} for bad in (0, "even", True, 10**400)),
         *({"camera_x_mm": bad} for bad in ("left", True, [1.0], float("1e999"))),
     ],
 }

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sainet.datasets.batch import to_batch, to_controls, to_initial
-from sainet.engines.identified import beliefs_of, identified_engine
+from sainet.engines.identified import beliefs_of, engine_of_beliefs
 from sainet.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
@@ -173,7 +173,7 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     assert card.assumed == beliefs_of(values)
     model = load_dynamics(str(out)).dynamics
     assert model.offset == (1.5e-3, 0.0)
-    assert model.dynamics.engine == identified_engine(values)
+    assert model.dynamics.engine == engine_of_beliefs(card.assumed)
     fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
     lost = shutil.copytree(out, tmp_path / "lost")
     write_json(lost / "card.json", card.to_dict() | {"assumed": None})
@@ -185,9 +185,8 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     arrays = store.read(slice(0, 4), task.names)
     assert "simulated_planar" not in arrays
     batch = task.to_batch(arrays, 12)
-    wanted = identified_engine(values).rollout(
-        batch.scene, batch.initial, batch.controls
-    )
+    engine = engine_of_beliefs(card.assumed)
+    wanted = engine.rollout(batch.scene, batch.initial, batch.controls)
     np.testing.assert_allclose(
         batch.simulated, pack_motion(wanted.states), rtol=1e-4, atol=1e-6
     )

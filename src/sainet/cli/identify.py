@@ -10,7 +10,7 @@ from sainet.cli.output import Output
 
 @dataclass(frozen=True, kw_only=True)
 class Identify:
-    """Fit the planar engine's own parameters to observed pushes."""
+    """Fit the planar engine's parameters and the camera's offset to observed pushes."""
 
     data: Path
     """Dataset of pushes along paths, observed at their ends at least."""

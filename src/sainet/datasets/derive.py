@@ -5,13 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import HASHES, write_store
 from sainet.runs import open_run
-
-Arrays = dict[str, np.ndarray]
 
 
 def derive(

@@ -8,9 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
-
-Arrays = dict[str, np.ndarray]
 
 _WINDOW = 8  # chunks that are shuffled together
 _ORDER_STREAM = 0x0DE5
@@ -26,7 +25,7 @@ class ChunkCache:
     store: Store
     names: tuple[str, ...]
     limit: int  # bytes
-    complete: Callable[[Arrays], Arrays] = lambda arrays: arrays  # noqa: E731
+    complete: Callable[[Arrays], Arrays] = lambda arrays: arrays
     _chunks: OrderedDict[int, Arrays] = field(default_factory=OrderedDict)
     _size: int = 0
 
@@ -75,7 +74,7 @@ class BatchReader:
     batch_size: int
     seed: int
     memory: int = 1 << 30  # bytes
-    complete: Callable[[Arrays], Arrays] = lambda arrays: arrays  # noqa: E731
+    complete: Callable[[Arrays], Arrays] = lambda arrays: arrays
 
     def __post_init__(self) -> None:
         """Look up the lengths and start the thread that reads ahead."""

@@ -9,14 +9,13 @@ import numpy as np
 
 from sainet.datasets.recorded import numbered, simulate
 from sainet.datasets.recorded_push import RecordedPush
-from sainet.datasets.schema import StoreInfo, simulated_name
+from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk
 from sainet.scene import TIME_STEP
 
 ASSUMED_ENGINES = ("planar", "planar-calibrated")
 _CHUNK_SIZE = 250  # pushes
 _CHUNK_STEPS = 300_000  # of all bodies, so that chunks of long pushes stay small
-Arrays = dict[str, np.ndarray]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,8 @@ from typing import Literal
 
 import numpy as np
 
+Arrays = dict[str, np.ndarray]  # of some pushes, by the names of variables
+
 FORMAT_VERSION = 1
 MOTION = ("x", "y", "angle", "velocity_x", "velocity_y", "spin")
 MOTION_UNITS = "m m rad m/s m/s rad/s"

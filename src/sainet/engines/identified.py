@@ -1,6 +1,5 @@
 """An engine whose own parameters were identified from observed pushes."""
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput
-from sainet.runs import read_json
+from sainet.runs import is_number, read_json
 
 FILE = "identified.json"
 IDENTIFIED = "identified"  # the name of such an engine on a network's card
@@ -17,14 +16,6 @@ RATIO = "pressure_radius_ratio"
 CAMERA = ("camera_x_mm", "camera_y_mm")  # where it sees things minus the robot's
 NAMES = (*FRICTIONS, RATIO, *CAMERA)
 USUAL_RATIO = 2 / 3  # of a pressure that is uniform
-
-
-def identified_engine(values: Mapping[str, float]) -> AssumedProperties:
-    """Return an engine with identified values, and the scene's where there is none.
-
-    Masses and radii are the scene's own.
-    """
-    return engine_of_beliefs(beliefs_of(values))
 
 
 def beliefs_of(values: Mapping[str, float]) -> dict[str, Any]:
@@ -78,16 +69,10 @@ def read_values(folder: Path) -> dict[str, float]:
     if not isinstance(values, dict) or not values:
         raise BadInput(f"{path}: values is missing; run 'sainet identify' again.")
     for name, value in values.items():
-        if not (name in NAMES and _is_number(value) and (name in CAMERA or value > 0)):
+        if not (name in NAMES and is_number(value) and (name in CAMERA or value > 0)):
             kind = "a number" if name in CAMERA else "a positive number"
             raise BadInput(
                 f"{path}: values.{name} is {value!r}; it must be {kind} for one of "
                 f"{', '.join(NAMES)}. Run 'sainet identify' again."
             )
     return values
-
-
-def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return math.isfinite(value)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from sainet.datasets.derive import Arrays, derive
+from sainet.datasets.derive import derive
 from sainet.datasets.recorded import simulate
-from sainet.datasets.schema import StoreInfo, simulated_name
+from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale

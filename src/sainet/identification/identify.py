@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.store import Store
-from sainet.engines.identified import FILE, NAMES
+from sainet.engines.identified import FILE, FRICTIONS, NAMES
 from sainet.errors import BadStore
 from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
@@ -71,6 +71,12 @@ def check_store(store: Store) -> None:
             f"{store.path}: kind is {store.info.kind!r}; parameters are identified "
             "from pushes along paths: give pushes of the robot setup."
         )
+    for name, values in store.read(slice(None), FRICTIONS).items():
+        if not values.mean() > 0:
+            raise BadStore(
+                f"{store.path}: {name} is {values.mean():g}; parameters are looked for "
+                "around a friction: import or generate the pushes with one."
+            )
 
 
 def identify(store: Store) -> Identified:

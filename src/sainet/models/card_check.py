@@ -1,27 +1,21 @@
 """What a card may say: checked when it is read, before anything is made of it."""
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from sainet.errors import BadCheckpoint
 from sainet.models.features import ACTION_SIZE, FEATURES
+from sainet.runs import is_number
 
 _Check = tuple[Callable[[Any], bool], str]
-
-
-def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return math.isfinite(value)
 
 
 def _is_positive_list(value: object) -> bool:
     return (
         isinstance(value, list)
         and len(value) > 0
-        and all(_is_number(v) and v > 0 for v in value)
+        and all(is_number(v) and v > 0 for v in value)
     )
 
 
@@ -45,29 +39,29 @@ _FIELDS: dict[str, _Check] = {
     "truth_engine": (_is(str), "the name of an engine"),
     "assumed": (_or_none(_is(dict)), "an object or null"),
     "data": (_is(str), "a hash"),
-    "data_seed": (_or_none(_is_number), "a number or null"),
+    "data_seed": (_or_none(is_number), "a number or null"),
     "weights": (_is(str), "a hash"),
     "config": (_is(dict), "an object"),
     "manifest": (_is(dict), "an object"),
     "started_from": (_or_none(_is(str)), "a hash or null"),
     "recurrent": (_is(bool), "true or false"),
-    "final_loss": (_or_none(_is_number), "a number or null"),
+    "final_loss": (_or_none(is_number), "a number or null"),
 }
 
 _ASSUMED: dict[str, _Check] = {
     "mass": (_or_none(_is_positive_list), "a list of positive numbers (kg) or null"),
     "radius": (_or_none(_is_positive_list), "a list of positive numbers (m) or null"),
     "friction": (
-        _or_none(lambda v: _is_number(v) and v >= 0),
+        _or_none(lambda v: is_number(v) and v >= 0),
         "a number from 0 up or null",
     ),
     **dict.fromkeys(
         # Of an engine that was identified.
         ("pusher_friction", "disk_friction", "pressure_radius_ratio"),
-        (_or_none(lambda v: _is_number(v) and v > 0), "a positive number or null"),
+        (_or_none(lambda v: is_number(v) and v > 0), "a positive number or null"),
     ),
     **dict.fromkeys(
-        ("camera_x_mm", "camera_y_mm"), (_or_none(_is_number), "a number or null")
+        ("camera_x_mm", "camera_y_mm"), (_or_none(is_number), "a number or null")
     ),
 }
 

@@ -13,8 +13,7 @@ from sainet.datasets.batch import (
     to_initial,
     to_scene,
 )
-from sainet.datasets.reader import Arrays
-from sainet.datasets.schema import StoreInfo, simulated_name
+from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.engines import ASSUMED_ENGINES, make_assumed_engine
 from sainet.engines.assumed import AssumedProperties, beliefs
 from sainet.engines.base import roll_out
