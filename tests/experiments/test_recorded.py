@@ -125,6 +125,7 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
 @pytest.mark.slow
 def test_ways_to_tune_are_compared_where_pushes_end(make, monkeypatch, tmp_path):
     one = {"learning_rate": 1e-3, "linear_from": 0.5, "mirror": True, "average": 10}
+    one = {"start": "engine"} | one
     monkeypatch.setattr(fine_tuning, "choices_of", lambda: iter([one]))
     monkeypatch.setattr(fine_tuning, "_ITERATIONS", {"quick": 1})
     monkeypatch.setattr(fine_tuning, "_TESTS", {"quick": 4})

@@ -202,6 +202,8 @@ def rollout(network, push_batch, simulated, push: int) -> np.ndarray:
             simulated_step, before = after - before, after
         change = accelerations(network, local, motion, simulated_step, step)
         rate = motion[:, 3:6] + network.time_step * change
+        if network.residual:
+            rate = rate + simulated_step[:, 3:]
         pose = motion[:, 0:3] + network.time_step * rate
         motion = np.concatenate([pose, rate], axis=1)
         path.append(to_table(local, motion))

@@ -28,7 +28,12 @@ STEPS = 24
 
 @lru_cache
 def network(
-    model: str, kind: str, seed: int = 0, *, place: bool = False
+    model: str,
+    kind: str,
+    seed: int = 0,
+    *,
+    place: bool = False,
+    residual: bool = False,
 ) -> InteractionNetwork:
     """An untrained network with scales that matter and effects that are large."""
     sizes = FeatureSizes(kind, model == "sain", place)
@@ -51,7 +56,12 @@ def network(
         where = lambda s: (s.body_mean, s.body_deviation)  # noqa: E731
         scales = eqx.tree_at(where, scales, shown)
     key = jax.random.key(seed)
-    made = InteractionNetwork(sizes, time_step=TIME_STEP, key=key, scales=scales)
+    made = InteractionNetwork(
+        sizes, time_step=TIME_STEP, key=key, scales=scales, residual=residual
+    )
+    if residual:  # it says nothing yet: it is to say what another one does
+        made = eqx.tree_at(lambda n: n.dyn, made, network(model, kind, seed).dyn)
+        return made
     layers, larger = (lambda n: (n.rel, n.dyn)), lambda w: 1.5 * w
     return eqx.tree_at(layers, made, jax.tree.map(larger, layers(made)))
 

@@ -120,6 +120,7 @@ BAD_FIELDS = {
     "weights": ["0" * 64, None],
     "features": ["place", "everything", None],
     "started_from": [3],
+    "residual": ["yes", None, 1],
     "config": [None, []],
     "assumed": [
         [1, 2],
@@ -164,6 +165,12 @@ def test_a_card_that_lacks_a_field_names_it(folder, name):
     del card[name]
     write_json(folder / CARD, card)
     with pytest.raises(BadCheckpoint, match=rf"{CARD}: {name} is missing"):
+        read_card(folder)
+
+
+def test_a_network_that_adds_to_an_engine_has_one(folder):
+    edit_card(folder, model="in", residual=True)
+    with pytest.raises(BadCheckpoint, match="model is 'in'; it must be 'sain' where"):
         read_card(folder)
 
 

@@ -10,19 +10,22 @@ from contracts.worlds import make_scene
 from models import naive
 from models.samples import (
     PUSHES,
+    Glide,
     assumed,
     dynamics,
     network,
     pushes,
     quick_dynamics,
 )
-from sainet.models.dynamics import predict
+from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.models.features import FeatureSizes
 from sainet.models.frame import (
     controls_to_frame,
     motion_from_frame,
     motion_to_frame,
     push_frame,
 )
+from sainet.models.interaction import InteractionNetwork
 from sainet.models.widen import widen
 from sainet.pushes import Push, path_controls
 from sainet.scene import TIME_STEP, at_rest, pack_motion
@@ -56,6 +59,31 @@ def test_the_network_is_the_papers_equations(model, kind, bodies):
     for push in range(PUSHES):
         wanted = naive.rollout(made.network, batch, simulated, push)
         np.testing.assert_allclose(found[push], wanted, atol=2e-5)
+
+
+@pytest.mark.parametrize("bodies", [1, 2, 3])
+@every_kind
+def test_the_residual_form_adds_the_engines_steps(kind, bodies):
+    batch = moving_pushes(kind, bodies)
+    made = SimulatorAugmented(network("sain", kind, residual=True), Glide())
+    found = np.asarray(pack_motion(predict(made, *batch).states))
+    rollout = eqx.filter_jit(made.engine.rollout)(*batch)
+    simulated = np.asarray(pack_motion(rollout.states), np.float64)
+    for push in range(PUSHES):
+        wanted = naive.rollout(made.network, batch, simulated, push)
+        np.testing.assert_allclose(found[push], wanted, atol=2e-5)
+
+
+@every_kind
+def test_a_residual_network_that_has_learned_nothing_is_the_engine(kind):
+    batch = moving_pushes(kind, 2)
+    sizes, key = FeatureSizes(kind, augmented=True), jax.random.key(0)
+    silent = InteractionNetwork(sizes, time_step=TIME_STEP, key=key, residual=True)
+    inside = assumed([0, 1])
+    found = pack_motion(predict(SimulatorAugmented(silent, inside), *batch).states)
+    wanted = pack_motion(predict(PhysicsDynamics(inside), *batch).states)
+    np.testing.assert_allclose(found[..., :3], wanted[..., :3], atol=2e-5)
+    np.testing.assert_allclose(found[..., 3:], wanted[..., 3:], atol=2e-4)
 
 
 @every_kind

@@ -9,7 +9,7 @@ import pytest
 
 from sainet.datasets.batch import to_batch, to_controls, to_initial
 from sainet.engines.identified import beliefs_of, engine_of_beliefs
-from sainet.errors import BadCheckpoint, BadInput, UnknownName
+from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import predict
@@ -89,6 +89,32 @@ def test_a_network_learns_to_see_the_place(store, start, tmp_path):
     assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
     with pytest.raises(BadCheckpoint, match="give --features place, too"):
         fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
+
+
+def test_a_network_that_starts_from_the_engine_goes_on_adding_to_it(store, tmp_path):
+    first, on = tmp_path / "first", tmp_path / "on"
+    fit("sain", store, TUNING, first, start_from="engine")
+    network, card = load_network(first)
+    assert (network.residual, card.residual, card.started_from) == (True, True, None)
+    assert np.abs(network.dyn.weights[-1]).max() > 0  # it has learned something
+    task = Task("sain", store, TUNING, PLANAR, from_engine=True)
+    silent = begin(task)[0].network
+    batch = task.to_batch(store.read(slice(None)), store.info.steps)
+    frame = push_frame(batch.scene, batch.initial)
+    np.testing.assert_allclose(
+        predict_batch(silent, batch)[..., 3:],
+        path_to_frame(batch.simulated, frame)[..., 3:],
+        atol=1e-5,
+    )
+    seeing = replace(TUNING, features="place")
+    fit("sain", store, seeing, on, start_from=str(first))
+    assert load_network(on)[0].residual
+    assert read_card(on).started_from == card.weights
+    with pytest.raises(RunConflict, match="start_from"):
+        fit("sain", store, TUNING, first)
+    with pytest.raises(BadInput, match="train sain, not in"):
+        fit("in", store, TUNING, tmp_path / "no", start_from="engine")
+    assert not (tmp_path / "no").exists()
 
 
 def test_the_best_network_on_the_validation_pushes_is_kept(

@@ -27,9 +27,10 @@ class Train:
     """Engine whose prediction SAIN corrects: by its name in the dataset, or the folder
     that `sainet identify` wrote."""
     start_from: str | None = None
-    """Network to go on from: a shipped one or the folder of a trained one. Other
-    defaults hold then, for few recorded pushes: 'sainet train --start-from sain --help'
-    shows them."""
+    """Network to go on from: a shipped one or the folder of a trained one; or engine:
+    a new one that adds to the assumed engine's motion, nothing at first. Other defaults
+    hold then, for few recorded pushes: 'sainet train --start-from engine --help' shows
+    them."""
     pushes: int | None = None
     """Pushes at the start of the dataset to train on; default: all."""
     config: FitConfig = field(default_factory=FitConfig)

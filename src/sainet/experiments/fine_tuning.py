@@ -25,8 +25,9 @@ from sainet.experiments.strokes import STROKES
 from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
 from sainet.training.config import FINE_TUNING
+from sainet.training.task import FROM_ENGINE
 
-START = "sain-stroke"
+STARTS = ("sain-stroke", FROM_ENGINE)
 LEARNING_RATES = (3e-4, 1e-3)
 LINEAR_FROM = (0.0, 0.5)
 MIRROR = (False, True)
@@ -40,7 +41,7 @@ _FAILED_BY = (0.01, 0.01, np.deg2rad(20))  # standard deviation, m and rad
 
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
-    """Tune the shipped network in every way that is considered; returns the table.
+    """Tune in every way that is considered; returns the table.
 
     Returns:
         The rows of each way, and in `choices` its `score`: position and rotation errors
@@ -49,22 +50,24 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     training = _stand_in("training", _TRAINING[scale], 0, chain)
     tests = _stand_in("tests", _TESTS[scale], 1, chain)
     tables, choices = [], []
-    for words in choices_of():
-        name = "-".join(f"{key}-{value:g}" for key, value in words.items())
+    for choice in choices_of():
+        words = dict(choice)
+        start = words.pop("start")
+        name = "-".join([start, *(f"{key}-{value:g}" for key, value in words.items())])
         config = replace(
             FINE_TUNING,
             iterations=_ITERATIONS[scale],
             batch_size=min(FINE_TUNING.batch_size, training.info.pushes),
             **words,
         )
-        result = chain.train("sain", training, config, name=name, start_from=START)
+        result = chain.train("sain", training, config, name=name, start_from=start)
         tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")
-        models = [load_dynamics("physics"), load_dynamics(START), tuned]
+        models = [load_dynamics("physics"), load_dynamics(STARTS[0]), tuned]
         found = chain.compare(models, tests, steps=0).to_dict()
         for row in (*found["rows"], *found["comparisons"]):
             row["group"] = name
         tables.append(found)
-        choices.append({**words, "score": _score(found["rows"])})
+        choices.append({**choice, "score": _score(found["rows"])})
     table = join(tables) | {"choices": choices}
     write_json(chain.out / "table.json", table)
     return table
@@ -72,8 +75,8 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
 
 def choices_of() -> Iterator[dict[str, Any]]:
     """Yield the settings that are considered, each with a value of its own."""
-    names = ("learning_rate", "linear_from", "mirror", "average")
-    for values in product(LEARNING_RATES, LINEAR_FROM, MIRROR, AVERAGE):
+    names = ("start", "learning_rate", "linear_from", "mirror", "average")
+    for values in product(STARTS, LEARNING_RATES, LINEAR_FROM, MIRROR, AVERAGE):
         yield dict(zip(names, values, strict=True))
 
 

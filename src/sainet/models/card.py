@@ -11,7 +11,7 @@ from sainet.runs import FORMAT_VERSION, read_json
 CARD = "card.json"
 WEIGHTS = "network.safetensors"
 # Fields that came later: what a card from before, which lacks them, means.
-_LATER = {"recurrent": True, "started_from": None}
+_LATER = {"recurrent": True, "started_from": None, "residual": False}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +33,7 @@ class Card:
     features: str = "paper"  # or "place"
     started_from: str | None = None  # hash of the weights that training began with
     recurrent: bool = True  # False: of single steps
+    residual: bool = False  # True: its acceleration is added to the inner engine's
     format_version: int = field(default=FORMAT_VERSION)
 
     def to_dict(self) -> dict[str, Any]:

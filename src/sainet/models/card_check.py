@@ -45,8 +45,11 @@ _FIELDS: dict[str, _Check] = {
     "manifest": (_is(dict), "an object"),
     "started_from": (_or_none(_is(str)), "a hash or null"),
     "recurrent": (_is(bool), "true or false"),
+    "residual": (_is(bool), "true or false"),
     "final_loss": (_or_none(is_number), "a number or null"),
 }
+
+_ADDS_TO_AN_ENGINE: _Check = (lambda v: v == "sain", "'sain' where residual is true")
 
 _ASSUMED: dict[str, _Check] = {
     "mass": (_or_none(_is_positive_list), "a list of positive numbers (kg) or null"),
@@ -77,6 +80,8 @@ def check_card(path: Path, found: dict[str, Any]) -> None:
         _require(path, name, found[name], check)
     for name, check in _ASSUMED.items():
         _require(path, f"assumed.{name}", (found["assumed"] or {}).get(name), check)
+    if found["residual"]:
+        _require(path, "model", found["model"], _ADDS_TO_AN_ENGINE)
 
 
 def _require(path: Path, name: str, value: object, check: _Check) -> None:

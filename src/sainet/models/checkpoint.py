@@ -21,7 +21,8 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
     """
     card = read_card(folder)
     augmented, place = card.model == "sain", card.features == "place"
-    network = untrained(FeatureSizes(card.kind, augmented, place), card.time_step)
+    sizes = FeatureSizes(card.kind, augmented, place)
+    network = untrained(sizes, card.time_step, residual=card.residual)
     loaded = load_arrays(folder / WEIGHTS, network)
     if content_hash((folder / WEIGHTS).read_bytes()) != card.weights:
         raise BadCheckpoint(
@@ -31,10 +32,14 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
     return loaded, card
 
 
-def untrained(sizes: FeatureSizes, time_step: float) -> InteractionNetwork:
+def untrained(
+    sizes: FeatureSizes, time_step: float, *, residual: bool
+) -> InteractionNetwork:
     """Return a network of shapes instead of arrays: drawing those takes seconds."""
 
     def make() -> InteractionNetwork:
-        return InteractionNetwork(sizes, time_step=time_step, key=jax.random.key(0))
+        return InteractionNetwork(
+            sizes, time_step=time_step, key=jax.random.key(0), residual=residual
+        )
 
     return eqx.filter_eval_shape(make)

@@ -81,6 +81,7 @@ class InteractionNetwork(eqx.Module):
     scales: Scales
     sizes: FeatureSizes
     time_step: float = eqx.field(static=True)  # s
+    residual: bool = eqx.field(static=True)  # beyond the paper, see `step`
 
     def __init__(
         self,
@@ -89,6 +90,7 @@ class InteractionNetwork(eqx.Module):
         time_step: float,
         key: PRNGKeyArray,
         scales: Scales | None = None,
+        residual: bool = False,
     ) -> None:
         """Make an untrained network.
 
@@ -97,13 +99,17 @@ class InteractionNetwork(eqx.Module):
             time_step: s, of the data it is for.
             key: draws the weights.
             scales: of its inputs and outputs; None is 1.
+            residual: whether its acceleration is added to the engine's. Its last layer
+                is zero then, so that the network is the engine until it learns.
         """
         rel_key, dyn_key = jax.random.split(key)
         self.rel = Layers((sizes.pair, *WIDTHS), key=rel_key)
-        self.dyn = Layers((sizes.body + EFFECT, *WIDTHS, 3), key=dyn_key)
+        dyn = Layers((sizes.body + EFFECT, *WIDTHS, 3), key=dyn_key)
+        self.dyn = _silenced(dyn) if residual else dyn
         self.scales = scales or unit_scales(sizes)
         self.sizes = sizes
         self.time_step = time_step
+        self.residual = residual
 
     def acceleration(
         self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
@@ -135,14 +141,24 @@ class InteractionNetwork(eqx.Module):
     ) -> Float[Array, "6 body push"]:
         """Return the next packed motion: v' = v + dt f_dyn, p' = p + dt v'.
 
+        The residual form adds what the engine says: v' = v + dv-bar + dt f_dyn.
+
         Args:
             motion: of every push, in columns (see `features.in_columns`).
             still: in columns.
             drive: in columns.
         """
         rate = motion[3:6] + self.time_step * self.acceleration(motion, still, drive)
+        if self.residual:
+            rate = rate + drive.simulated_rate_step
         pose = motion[0:3] + self.time_step * rate
         return jnp.concatenate([pose, rate])
+
+
+def _silenced(layers: Layers) -> Layers:
+    """Return layers whose last says zero to everything."""
+    last = lambda those: (those.weights[-1], those.biases[-1])  # noqa: E731
+    return eqx.tree_at(last, layers, replace_fn=jnp.zeros_like)
 
 
 def _standardise(x: Array, mean: Array, deviation: Array) -> Array:

@@ -35,6 +35,6 @@ def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:
     sizes = replace(network.sizes, place=True)
     return eqx.tree_at(
         lambda n: (n.rel, n.dyn, n.scales),
-        untrained(sizes, network.time_step),
+        untrained(sizes, network.time_step, residual=network.residual),
         (network.rel, dyn, seen),
     )

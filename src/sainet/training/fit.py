@@ -41,7 +41,14 @@ from sainet.training.step import (
     make_step,
     trained_layers,
 )
-from sainet.training.task import Start, Task, begin, check_data, settings
+from sainet.training.task import (
+    FROM_ENGINE,
+    Start,
+    Task,
+    begin,
+    check_data,
+    settings,
+)
 
 STATE = "state.safetensors"
 Validate = Callable[[InteractionNetwork], float]
@@ -77,6 +84,7 @@ def fit(
         assumed_engine: whose prediction SAIN sees: by its name in the store, or the
             folder of an identified engine, which then predicts as it is needed.
         start_from: the network to go on from, by its name or folder; None draws one.
+            `engine` draws one that adds to the assumed engine, and adds nothing yet.
         on_step: told the finished iterations and the loss that was last logged.
 
     Raises:
@@ -86,7 +94,9 @@ def fit(
         Diverged: the loss left the finite numbers for good.
     """
     assumed = find_assumed_engine(assumed_engine)
-    task = Task(model, store, config, assumed, _start(start_from))
+    from_engine = start_from == FROM_ENGINE
+    start = None if from_engine else _start(start_from)
+    task = Task(model, store, config, assumed, start, from_engine)
     check_data(task)
     devices = jax.device_count()
     folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
@@ -95,7 +105,7 @@ def fit(
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
     state, weights = begin(task)
-    start = trained_layers(state.network) if task.start else None
+    drawn_to = trained_layers(state.network) if task.start else None
     validate = _make_validation(task, weights)
     best = Best.first(state.network, validate(state.network)) if validate else None
     if (out / STATE).is_file():
@@ -104,7 +114,7 @@ def fit(
     # Where the step leaves it: otherwise its first call compiles a second time.
     state = jax.device_put(state, jax.devices()[0])
     progress = Progress(state, best, history)
-    step = make_step(config, weights, start)
+    step = make_step(config, weights, drawn_to)
     _iterate(task, progress, step, validate, out=out, on_step=on_step)
     _finish(task, progress, folder)
     return FitResult(out, history)
@@ -231,6 +241,7 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         features=task.config.features,
         started_from=task.start.card.weights if task.start else None,
         recurrent=task.config.recurrent,
+        residual=progress.network.residual,
         final_loss=history[-1]["loss"] if history else None,
     )
     write_json(folder.path / CARD, card.to_dict())

@@ -28,6 +28,7 @@ from sainet.training.step import FitState, first_state
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
 _PLANAR = "planar"  # what an identified engine is with other numbers
+FROM_ENGINE = "engine"  # where a network starts that corrects the engine from nothing
 _ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
 # Settings that came later: a folder from before, which lacks them, had these.
 _LATER = {
@@ -60,6 +61,7 @@ class Task:
     config: FitConfig
     assumed: AssumedEngine
     start: Start | None = None  # None: weights are drawn
+    from_engine: bool = False  # drawn so that the network is the engine at first
 
     @property
     def inner(self) -> AssumedEngine | None:
@@ -136,6 +138,11 @@ def check_data(task: Task) -> None:
     """Raise `BadStore` or `BadInput` if the data lack what training needs."""
     path = task.store.path
     _check_assumed(task)
+    if task.from_engine and task.inner is None:
+        raise BadInput(
+            f"--start-from {FROM_ENGINE} needs a network that corrects an engine; "
+            f"train sain, not {task.model}."
+        )
     if task.config.validation_share and task.validation is None:
         raise BadInput(
             f"--validation-share is {task.config.validation_share}; {path} has no two "
@@ -222,6 +229,7 @@ def settings(task: Task) -> dict[str, Any]:
         if config[name] == before:
             del config[name]
     start = {"start_from": task.start.card.weights} if task.start else {}
+    start = {"start_from": FROM_ENGINE} if task.from_engine else start
     computed = {} if task.assumed.is_stored else {"assumed": task.assumed.beliefs}
     return {
         "command": "train",
@@ -250,6 +258,7 @@ def _first_network(task: Task, scales: Scales) -> InteractionNetwork:
             time_step=task.store.info.time_step,
             key=jax.random.key(task.config.seed),
             scales=scales,
+            residual=task.from_engine,
         )
     network = task.start.network
     return widen(network, scales) if task.sizes != network.sizes else network
