@@ -141,26 +141,29 @@ def _recorded() -> str:
 def _tuning() -> str:
     words = _reproduce("fine-tuning")
     found = _run(*words)
-    names = ("learning_rate", "linear_from", "mirror", "average")
+    names = ("start", "learning_rate", "linear_from", "mirror", "average")
     lines = [
         f"| {' | '.join(name.replace('_', ' ') for name in names)} | score |",
-        "| --: | --: | :-- | --: | --: |",
+        "| :-- | --: | --: | :-- | --: | --: |",
     ]
     for choice in found["choices"]:
         told = [_short(choice[name]) for name in names]
         lines.append(f"| {' | '.join(told)} | {choice['score']:.4f} |")
     scores = {tuple(c[name] for name in names): c["score"] for c in found["choices"]}
-    chosen = scores[tuple(getattr(FINE_TUNING, name) for name in names)]
+    usual = tuple(getattr(FINE_TUNING, name) for name in names[1:])
+    starts = dict.fromkeys(choice["start"] for choice in found["choices"])
+    told = [
+        f"From `{start}` the defaults have {scores[start, *usual]:.4f}, the least is "
+        f"{min(s for way, s in scores.items() if way[0] == start):.4f}."
+        for start in starts
+    ]
     return (
-        f"`sainet {' '.join(words)}`: `sain-stroke` tuned on 200 simulated pushes, of "
-        "which the ends alone are seen, of a robot whose friction of contact (0.4) the "
+        f"`sainet {' '.join(words)}`: tuned on 200 simulated pushes, of which "
+        "the ends alone are seen, of a robot whose friction of contact (0.4) the "
         "engine does not know (0.25), with three times the usual noise of friction and "
         "capture and one recording in twenty that failed; compared on 300 others, "
         "where none did. The score is the mean error over that of physics, one "
-        "training each.\n\n"
-        + "\n".join(lines)
-        + f"\n\nThe defaults of `--start-from` have {chosen:.4f}, the least is "
-        f"{min(scores.values()):.4f}."
+        "training each.\n\n" + "\n".join(lines) + f"\n\n{' '.join(told)}"
     )
 
 
@@ -172,7 +175,9 @@ def _recorded_pushes() -> str:
         f"`sainet {' '.join(words)}`: real pushes, five folds by surface, contact and "
         "direction, so that repeats never straddle; a model of its own for each "
         "surface, unless its name says `for-all`. Intervals are over folds and pushes. "
-        "`tuned`: from the network of simulated strokes; `real`: these pushes alone; "
+        "`tuned`: from the network of simulated strokes; `residual`: added to the "
+        "engine, nothing at first, these pushes alone (`--start-from engine`); `real`: "
+        "these pushes alone, in the paper's form; "
         "`identified`: around the engine identified on the same training pushes; "
         "`place`: sees where on the table it is.\n\n"
         f"{to_markdown(found)}\n{figure}\n\nWhat an engine misses of the end of a "

@@ -22,8 +22,8 @@ from training.stores import end_points_alone, info_of, made_up, write
 
 FEW = (
     Variant("sain", "simulation", "identified"),
-    Variant("sain", "tuned"),
-    Variant("sain", "real", "identified", "place"),
+    Variant("sain", "residual", "identified"),
+    Variant("sain", "tuned", features="place"),
 )
 
 
@@ -88,7 +88,8 @@ def test_without_recorded_pushes_there_is_no_table(chain):
 def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
     table = make("recorded-pushes")
     names = {"physics", "physics-identified", *(each.name for each in FEW)}
-    everywhere = {*names, "sain-tuned-for-all"}
+    told = "sain-identified-residual"
+    everywhere = {*names, f"{told}-for-all"}
     rows = {(row["group"], row["model"]): row for row in table["rows"]}
     groups = {"abs": 12, "plywood": 12, "all": 24}
     for group, count in groups.items():
@@ -99,7 +100,7 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
     assert elsewhere == {"abs to plywood, 0 of it", "abs to plywood, 50 of it"}
     assert {row["model"] for row in table["published"]} == {"convex"}
     against = {row["against"] for row in table["comparisons"]}
-    assert against == (everywhere | {"convex"}) - {"sain-tuned"}
+    assert against == (everywhere | {"convex"}) - {told}
     folder = tmp_path / "recorded-pushes"
     assert (folder / "engine-errors.svg").is_file()
     assert read_json(folder / "table.json")["rows"] == table["rows"]
@@ -107,17 +108,18 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
         path.parent.relative_to(folder).as_posix(): read_card(path.parent)
         for path in folder.rglob("card.json")
     }
-    trained = {"sain-tuned", "sain-identified-real-place"}
+    trained = {told, "sain-tuned-place"}
     assert {name for name in cards if name.startswith(("abs/", "ply"))} == {
         f"{surface}/fold-{fold}/{name}"
         for surface in ("abs", "plywood")
         for fold in (0, 1)
         for name in trained
     }
-    real = cards["abs/fold-0/sain-identified-real-place"]
-    assert (real.started_from, real.features) == (None, "place")
-    assert real.inner_engine == "identified"
-    tuned = [card for name, card in cards.items() if name.endswith("sain-tuned")]
+    added = cards[f"abs/fold-0/{told}"]
+    assert (added.started_from, added.residual) == (None, True)
+    assert (added.inner_engine, added.features) == ("identified", "paper")
+    tuned = [card for name, card in cards.items() if name.endswith("tuned-place")]
+    assert {card.features for card in tuned} == {"place"}
     assert {card.started_from for card in tuned} == {tuned[0].started_from} != {None}
     assert len({card.data for card in cards.values()}) == 8  # no two saw the same
 

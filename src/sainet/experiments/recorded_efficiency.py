@@ -24,7 +24,7 @@ VARIANTS = (
     Variant("in", "tuned"),
     Variant("sain", "tuned"),
     Variant("sain", "tuned", "identified"),
-    Variant("sain", "real"),
+    Variant("sain", "residual", "identified"),
 )
 
 

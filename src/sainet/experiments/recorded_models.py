@@ -19,17 +19,23 @@ from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import load_dynamics, network_folder
 from sainet.training.config import FINE_TUNING, Features, FitConfig, ModelKind
+from sainet.training.task import FROM_ENGINE
 
 IDENTIFIED = "physics-identified"
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
-Learned = Literal["simulation", "tuned", "real"]
+Learned = Literal["simulation", "tuned", "residual", "real"]
 _STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
 _ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A network, what it knows, and what of."""
+    """A network, what it knows, and what of.
+
+    Simulation: of strokes that the nominal engine made, and nothing else. The others
+    learn recorded pushes. Tuned: begins with the network of simulation. Residual: adds
+    to the engine, and nothing at first. Real: begins with nothing, in the paper's form.
+    """
 
     network: ModelKind
     learned: Learned
@@ -77,9 +83,9 @@ class Tuner:
         return [replace(self._model(each), name=each.name) for each in variants]
 
     def _model(self, variant: Variant) -> NamedDynamics:
-        start, is_identified = _STROKES[variant.network], variant.engine != "nominal"
+        strokes, is_identified = _STROKES[variant.network], variant.engine != "nominal"
         if variant.learned == "simulation":
-            found = load_dynamics(start)
+            found = load_dynamics(strokes)
             return self._around_identified(found) if is_identified else found
         result = self.chain.train(
             variant.network,
@@ -87,7 +93,9 @@ class Tuner:
             self._config(variant),
             name=f"{self.folder}/{variant.name}",
             assumed_engine=str(self._identified()) if is_identified else "planar",
-            start_from=start if variant.learned == "tuned" else None,
+            start_from={"tuned": strokes, "residual": FROM_ENGINE, "real": None}[
+                variant.learned
+            ],
         )
         return load_dynamics(str(result.folder))
 
