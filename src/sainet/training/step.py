@@ -1,6 +1,7 @@
 """One gradient step, compiled once: the batch is split over all devices."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -150,29 +151,36 @@ def make_step(
     (see `even_batch`), and returns the next state and the mean loss of the pushes, l2
     left out.
     """
-    optimizer, gradient = make_optimizer(config), make_gradient(weights)
-
-    @jax.jit
-    def update(
-        state: FitState, total: Array, summed: Trained, pushes: Array
-    ) -> tuple[FitState, Array]:
-        layers = trained_layers(state.network)
-        change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
-        mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, change)
-        updates, moments = optimizer.update(mean, state.optimizer, layers)
-        layers = optax.apply_updates(layers, updates)
-        average = state.average
-        if average is not None:
-            average = _averaged(average, layers, config, state.iteration)
-        network = with_layers(state.network, layers)
-        after = FitState(network, moments, state.iteration + 1, average)
-        return after, total / pushes
+    gradient = make_gradient(weights)
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
-        return update(state, total, summed, jnp.sum(batch.is_observed))
+        pushes = jnp.sum(batch.is_observed)
+        return _update(state, start, summed, pushes, config), total / pushes
 
     return step
+
+
+# Compiled once for each set of settings, however many networks are trained by them.
+@partial(jax.jit, static_argnames="config")
+def _update(
+    state: FitState,
+    start: Trained | None,
+    summed: Trained,
+    pushes: Array,
+    config: FitConfig,
+) -> FitState:
+    """Take Adam's step along the mean gradient of so many pushes, l2 added."""
+    layers = trained_layers(state.network)
+    change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
+    mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, change)
+    updates, moments = make_optimizer(config).update(mean, state.optimizer, layers)
+    layers = optax.apply_updates(layers, updates)
+    average = state.average
+    if average is not None:
+        average = _averaged(average, layers, config, state.iteration)
+    network = with_layers(state.network, layers)
+    return FitState(network, moments, state.iteration + 1, average)
 
 
 def even_batch(batch: PushBatch) -> PushBatch:
