@@ -201,9 +201,12 @@ def rollout(network, push_batch, simulated, push: int) -> np.ndarray:
             after = to_local(local, simulated[push, step])
             simulated_step, before = after - before, after
         change = accelerations(network, local, motion, simulated_step, step)
-        rate = motion[:, 3:6] + network.time_step * change
+        rate = motion[:, 3:6]
         if network.residual:
-            rate = rate + simulated_step[:, 3:]
+            engine = simulated_step[:, :3] / network.time_step
+            fading = np.exp(-network.time_step / 0.1)
+            rate = engine + fading * (rate - engine + simulated_step[:, 3:])
+        rate = rate + network.time_step * change
         pose = motion[:, 0:3] + network.time_step * rate
         motion = np.concatenate([pose, rate], axis=1)
         path.append(to_table(local, motion))

@@ -217,6 +217,17 @@ def test_scales_are_the_statistics_of_what_networks_see():
     np.testing.assert_allclose(scales.body_deviation, deviation, rtol=1e-3)
 
 
+def test_a_property_that_never_varies_is_not_divided_by_rounding():
+    def of_one_disk(arrays):
+        alike = np.ones_like(arrays["mass"])
+        return arrays | {"mass": 0.8937 * alike, "radius": 0.0525 * alike}
+
+    batch = batch_of(change=of_one_disk)
+    scales = feature_scales(batch, network("sain", "robot").sizes)
+    assert scales.body_deviation[-2:].tolist() == [1, 1]
+    assert scales.pair_deviation[-4:].tolist() == [1, 1, 1, 1]
+
+
 def test_the_scale_of_accelerations_is_theirs_and_the_same_for_x_and_y():
     batch = batch_of()
     scales = feature_scales(batch, network("sain", "robot").sizes)

@@ -4,6 +4,8 @@ One class is both IN and SAIN; they differ in whether the features hold the simu
 prediction (eq. 4 to 7 and 8 to 12 of the paper).
 """
 
+import math
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,9 @@ from sainet.models.features import (
 WIDTHS = (128, 64, 32, 16)
 EFFECT = WIDTHS[-1]
 FEATURE_BOUND = 4.0  # standard deviations
+# Time constant of a residual network's deviation from the engine's rates, s. Friction
+# stops what is pushed as fast; without it whatever f_dyn says adds up for seconds.
+FADING = 0.1
 _CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
 
 
@@ -141,16 +146,20 @@ class InteractionNetwork(eqx.Module):
     ) -> Float[Array, "6 body push"]:
         """Return the next packed motion: v' = v + dt f_dyn, p' = p + dt v'.
 
-        The residual form adds what the engine says: v' = v + dv-bar + dt f_dyn.
+        The residual form adds f_dyn to the engine's motion, and its deviation from that
+        fades: v' = v-bar' + exp(-dt / tau) (v - v-bar) + dt f_dyn.
 
         Args:
             motion: of every push, in columns (see `features.in_columns`).
             still: in columns.
             drive: in columns.
         """
-        rate = motion[3:6] + self.time_step * self.acceleration(motion, still, drive)
+        rate, change = motion[3:6], self.acceleration(motion, still, drive)
         if self.residual:
-            rate = rate + drive.simulated_rate_step
+            simulated = drive.simulated_pose_step / self.time_step  # over this step
+            deviation = rate - (simulated - drive.simulated_rate_step)
+            rate = simulated + math.exp(-self.time_step / FADING) * deviation
+        rate = rate + self.time_step * change
         pose = motion[0:3] + self.time_step * rate
         return jnp.concatenate([pose, rate])
 

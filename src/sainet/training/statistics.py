@@ -21,7 +21,8 @@ from sainet.training.batch import path_to_frame
 from sainet.training.config import FitConfig
 from sainet.training.loss import LossWeights
 
-_CONSTANT = 1e-9  # a deviation below this is that of a feature that never varies
+# A deviation below this, or this share of the mean, is rounding: nothing varies.
+_CONSTANT, _CONSTANT_SHARE = 1e-9, 1e-4
 _STILL = 1e-14  # a mean square (m^2, say) below this is rounding
 
 
@@ -60,9 +61,10 @@ def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
 
 def _spread(features: Array) -> tuple[Array, Array]:
     rows = features.reshape(features.shape[0], -1)
-    deviation = jnp.std(rows, axis=1)
-    # A feature that never varies, a fixed mass say, must not be divided by zero.
-    return jnp.mean(rows, axis=1), jnp.where(deviation > _CONSTANT, deviation, 1.0)
+    mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
+    # A feature that never varies, a fixed mass say, must not be divided by rounding.
+    varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
+    return mean, jnp.where(varies, deviation, 1.0)
 
 
 @eqx.filter_jit
