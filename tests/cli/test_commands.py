@@ -160,7 +160,7 @@ def shown(*words):
 def test_going_on_from_a_network_has_defaults_of_its_own():
     usual, tuned = shown("train", "in"), shown("train", "in", "--start-from", "in")
     assert "Number of gradient steps. (default: 10000)" in usual
-    assert "Number of gradient steps. (default: 800)" in tuned
+    assert "Number of gradient steps. (default: 300)" in tuned
     assert "(default: error)" in tuned
     assert shown("train", "in", "--start-from=in") == tuned
 
@@ -172,7 +172,7 @@ def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
     assert json.loads(done.stdout.splitlines()[-1])["model"] == "in"
     card = json.loads((tmp_path / "tuned/card.json").read_text())
     assert card["started_from"]
-    assert card["config"]["validation_share"] == 0.2
+    assert card["config"]["l2"] == 1e-3
     words = ("identify", "--data", pushes, "--out", tmp_path / "mine")
     found = sainet(*words, "--json", "--quiet").stdout
     estimates = json.loads(found.splitlines()[-1])["estimates"]

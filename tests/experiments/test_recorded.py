@@ -126,20 +126,21 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
 
 @pytest.mark.slow
 def test_ways_to_tune_are_compared_where_pushes_end(make, monkeypatch, tmp_path):
-    one = {"learning_rate": 1e-3, "linear_from": 0.5, "mirror": True, "average": 10}
-    one = {"start": "engine"} | one
-    monkeypatch.setattr(fine_tuning, "choices_of", lambda: iter([one]))
-    monkeypatch.setattr(fine_tuning, "_ITERATIONS", {"quick": 1})
+    one = {"learning_rate": 1e-3, "mirror": False}
+    monkeypatch.setattr(fine_tuning, "STARTS", ("engine",))
+    monkeypatch.setattr(fine_tuning, "CHANGES", (one,))
+    monkeypatch.setattr(fine_tuning, "_QUICK_ITERATIONS", 1)
     monkeypatch.setattr(fine_tuning, "_TESTS", {"quick": 4})
     table = make("fine-tuning")
     rows = {row["model"]: row for row in table["rows"]}
-    assert rows.keys() == {"physics", "sain-stroke", "sain-tuned"}
+    assert rows.keys() == {"physics", "sain-tuned"}
     ratios = [
         rows["sain-tuned"][key] / rows["physics"][key]
         for key in ("final_pos_mm", "final_rot_deg")
     ]
     (choice,) = table["choices"]
-    assert choice == one | {"score": pytest.approx(np.mean(ratios))}
+    score = pytest.approx(np.mean(ratios))
+    assert choice == {"start": "engine", "change": one, "score": score}
     seen = open_store(tmp_path / "fine-tuning" / "tests").read(slice(None))
     assert seen["pose_observed"].sum(axis=1).tolist() == [1] * 4
     last = seen["pose_observed"][np.arange(4), seen["steps"] - 1]
@@ -150,7 +151,7 @@ def test_ways_to_tune_are_compared_where_pushes_end(make, monkeypatch, tmp_path)
     missed = np.linalg.norm(
         (made["measured"] - made["truth"][..., :3])[..., :2], axis=-1
     )
-    assert np.sum(missed.min(axis=(1, 2)) > 3e-3) == round(0.05 * 20)
+    assert np.sum(missed.min(axis=(1, 2)) > 6e-3) == round(0.05 * 20)
 
 
 @pytest.mark.slow

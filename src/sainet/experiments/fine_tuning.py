@@ -8,7 +8,6 @@ that was made twice, and one recording in twenty fails: the disk is seen elsewhe
 where it ended. What is to be told is where it ended, so no test scatters or fails.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -30,13 +29,24 @@ from sainet.training.config import FINE_TUNING
 from sainet.training.task import FROM_ENGINE
 
 STARTS = ("sain-stroke", FROM_ENGINE)
-LEARNING_RATES = (3e-4, 1e-3)
-LINEAR_FROM = (0.0, 0.5)
-MIRROR = (False, True)
-AVERAGE = (0, 100)
+# The defaults, and what else they could be, one thing at a time.
+CHANGES: tuple[dict[str, Any], ...] = (
+    {},
+    {"learning_rate": 3e-4},
+    {"learning_rate": 3e-3},
+    {"iterations": 150},
+    {"iterations": 600},
+    {"l2": 1e-6},
+    {"l2": 1e-2},
+    {"linear_from": 0.0},
+    {"linear_from": 1.0},
+    {"mirror": False},
+    {"average": 0},
+    {"validation_share": 0.2, "patience": 250, "iterations": 800},
+)
 _BELIEVED, _TRUE = 0.25, 0.4  # friction of contact
 _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
-_ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
+_QUICK_ITERATIONS = 20
 _ENGINE = "planar"
 # Standard deviations, m and rad. The scatter is what is left between recordings of one
 # push on ABS at two speeds, whatever an identified engine says of them.
@@ -55,34 +65,25 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     training = _stand_in("training", _TRAINING[scale], 0, chain)
     tests = _stand_in("tests", _TESTS[scale], 1, chain)
     tables, choices = [], []
-    for choice in choices_of():
-        words = dict(choice)
-        start = words.pop("start")
-        name = "-".join([start, *(f"{key}-{value:g}" for key, value in words.items())])
-        config = replace(
-            FINE_TUNING,
-            iterations=_ITERATIONS[scale],
-            batch_size=min(FINE_TUNING.batch_size, training.info.pushes),
-            **words,
-        )
+    for start, change in product(STARTS, CHANGES):
+        name = "-".join([start, *(f"{key}-{value:g}" for key, value in change.items())])
+        size = min(FINE_TUNING.batch_size, training.info.pushes)
+        config = replace(FINE_TUNING, batch_size=size, **change)
+        if scale == "quick":
+            config = replace(config, iterations=_QUICK_ITERATIONS)
         result = chain.train("sain", training, config, name=name, start_from=start)
         tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")
-        models = [load_dynamics("physics"), load_dynamics(STARTS[0]), tuned]
+        models = [load_dynamics("physics"), tuned]
         found = chain.compare(models, tests, steps=0).to_dict()
         for row in (*found["rows"], *found["comparisons"]):
             row["group"] = name
         tables.append(found)
-        choices.append({**choice, "score": _score(found["rows"])})
+        choices.append(
+            {"start": start, "change": change, "score": _score(found["rows"])}
+        )
     table = join(tables) | {"choices": choices}
     write_json(chain.out / "table.json", table)
     return table
-
-
-def choices_of() -> Iterator[dict[str, Any]]:
-    """Yield the settings that are considered, each with a value of its own."""
-    names = ("start", "learning_rate", "linear_from", "mirror", "average")
-    for values in product(STARTS, LEARNING_RATES, LINEAR_FROM, MIRROR, AVERAGE):
-        yield dict(zip(names, values, strict=True))
 
 
 def _recording_errors(info: StoreInfo) -> Float[np.ndarray, "push 3"]:

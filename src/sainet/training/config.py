@@ -99,10 +99,10 @@ class FitConfig:
             )
 
 
-# For a network that goes on from another on few recorded pushes: the least error on
+# For what goes on from the engine or a network, on few recorded pushes: chosen on
 # simulated ones that stand in for them (`sainet reproduce fine-tuning`).
 FINE_TUNING = FitConfig(
-    iterations=800,
+    iterations=300,
     batch_size=50,
     halve_every=200,
     steps=10_000,
@@ -110,7 +110,6 @@ FINE_TUNING = FitConfig(
     linear_from=0.5,
     mirror=True,
     average=100,
-    validation_share=0.2,
-    patience=250,
+    l2=1e-3,
     log_every=25,
 )
