@@ -143,18 +143,19 @@ def _tuning() -> str:
     found = _run(*words)
     scores: dict[str, list[str]] = {}
     for choice in found["choices"]:
-        change = ", ".join(f"{_told(k)} {v:g}" for k, v in choice["change"].items())
+        change = _changed(choice["change"])
         scores.setdefault(change, []).append(f"{choice['score']:.3f}")
     starts = dict.fromkeys(choice["start"] for choice in found["choices"])
     head = " | ".join(f"from `{start}`" for start in starts)
     lines = [
-        f"| other than the defaults | {head} |",
+        f"| way | {head} |",
         "| :-- |" + " --: |" * len(starts),
     ]
     lines += [
         f"| {change or 'nothing'} | {' | '.join(row)} |"
         for change, row in scores.items()
     ]
+    least = min(found["choices"], key=lambda choice: choice["score"])
     usual = ", ".join(
         f"{_told(name)} {getattr(FINE_TUNING, name):g}"
         for name in dict.fromkeys(k for c in found["choices"] for k in c["change"])
@@ -166,8 +167,15 @@ def _tuning() -> str:
         "capture, ends that scatter as those of real pushes do when they are repeated "
         "(1.7 mm, 5.5 degrees) and one recording in twenty that failed; compared on "
         "300 others, where nothing scatters or fails. The score is the mean error over "
-        f"that of physics, one training each. Defaults: {usual}.\n\n" + "\n".join(lines)
+        f"that of physics, one training each. Defaults: {usual}.\n\n"
+        + "\n".join(lines)
+        + f"\n\nThe least is {least['score']:.3f}, from `{least['start']}` with "
+        f"{_changed(least['change'])}."
     )
+
+
+def _changed(change: dict[str, float]) -> str:
+    return ", ".join(f"{_told(k)} {v:g}" for k, v in change.items()) or "the defaults"
 
 
 def _recorded_pushes() -> str:
