@@ -30,7 +30,12 @@ from training.stores import end_points_alone, info_of, made_up, write
 PLANAR = find_assumed_engine("planar")
 BEFORE = FitConfig(iterations=3, batch_size=4, steps=12, log_every=1)
 TUNING = replace(
-    FINE_TUNING, iterations=8, batch_size=4, log_every=1, checkpoint_every=2, patience=0
+    FINE_TUNING,
+    iterations=8,
+    batch_size=4,
+    validation_share=0.2,
+    log_every=1,
+    checkpoint_every=2,
 )
 
 
