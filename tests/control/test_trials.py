@@ -16,6 +16,8 @@ from sainet.control.config import ControlConfig
 from sainet.control.summary import paired_test, summarise
 from sainet.control.trials import episode_file, make_trial, run_trials
 from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+from sainet.runs import CONFIG as CONFIG_FILE
+from sainet.runs import read_json
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
 
@@ -163,6 +165,20 @@ def test_models_see_the_same_worlds_and_their_own_properties():
     assert chain.task.moved == 2
 
 
+def test_an_episode_may_aim_closer_than_it_is_judged(tmp_path, monkeypatch):
+    aimed = []
+    run = lambda robot, planner, dynamics, task, scene, **_: aimed.append(task)  # noqa: E731
+    monkeypatch.setattr(trials, "run_episode", run)
+    for aim in (1.0, 0.8):
+        config = replace(CONFIG, trials=1, aim=aim)
+        (judged,) = run_trials(config, tmp_path / str(aim))
+        assert judged["tolerance_mm"] == pytest.approx(5.9)
+        assert aimed[-1].tolerance == pytest.approx(aim * 0.1)
+    # Trials from before there was this setting go on.
+    told = [read_json(tmp_path / name / CONFIG_FILE) for name in ("1.0", "0.8")]
+    assert [one.get("aim") for one in told] == [None, 0.8]
+
+
 @pytest.mark.parametrize(
     ("changes", "error", "says"),
     [
@@ -189,7 +205,7 @@ def test_a_network_for_other_controls_is_refused(tmp_path):
     [
         *(("trials", 0), ("pushes", 0), ("disks", 1), ("seed", -1)),
         *(("tolerance", 0.0), ("tolerance", 1.5), ("alignment", -1.0)),
-        ("deadline", 0.0),
+        *(("deadline", 0.0), ("aim", 0.0), ("aim", 1.1)),
     ],
 )
 def test_bad_settings_name_their_option(name, value):
@@ -197,11 +213,9 @@ def test_bad_settings_name_their_option(name, value):
         ControlConfig(**{name: value})
 
 
-def records_of(solved, pushes=20, final=3.0):
-    return [
-        {"solved": s, "pushes": pushes, "final_mm": final, "decision_s": [0.1, 0.3]}
-        for s in solved
-    ]
+def records_of(solved, pushes=20, final=3.0, reason="solved"):
+    same = {"pushes": pushes, "final_mm": final, "reason": reason}
+    return [{**same, "solved": s, "decision_s": [0.1, 0.3]} for s in solved]
 
 
 def test_success_has_wilsons_interval():
@@ -217,6 +231,12 @@ def test_success_has_wilsons_interval():
     assert found["within_4_mm"] == 1.0
     assert found["within_25_pushes"] == 0.88
     assert summarise(records_of([False]))["median_pushes"] is None
+
+
+def test_failures_that_sight_ended_are_told():
+    seen, lost = (records_of([False], reason=r) for r in ("solved", "out of pushes"))
+    found = summarise(records_of([True]) + seen + 2 * lost)
+    assert (found["solved"], found["ended_early"]) == (1, 1)
 
 
 def test_pairs_are_compared_exactly():

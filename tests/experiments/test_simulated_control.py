@@ -54,8 +54,9 @@ def result():
         "within_25_pushes": 0.61,
         "within_4_mm": 0.5,
         "median_decision_s": 0.4149,
+        "ended_early": 1,
     }
-    none = {"solved": 0, "success": 0.0, "median_pushes": None}
+    none = {"solved": 0, "success": 0.0, "median_pushes": None, "ended_early": 0}
     rows = [row | {"model": "sain"}, row | none | {"model": "in"}]
     pair = {"group": "hard, tree", "model": "sain", "against": "in"}
     pair |= {"only_one": 6, "only_other": 1, "p": 0.125}
@@ -71,6 +72,8 @@ def test_the_table_says_everything_once():
     for part in ("98/100", "93%–99%", "24.5", "61%", "0.415", "22/25", "published"):  # noqa: RUF001
         assert part in text
     assert "SAIN alone solved 6, IN alone 1 (exact McNemar p = 0.12)" in text
+    assert "SAIN: 1 of 2 not solved ended as the disk was seen there" in text
+    assert "IN: " not in text.replace("SAIN: ", "")
     lines = control_markdown(result()).splitlines()
     assert {line.count("|") for line in lines if line.startswith("|")} == {9}
     assert "| hard, tree | IN | 0/100 |" in lines[3]

@@ -35,6 +35,9 @@ class ControlConfig:
     nominal ones that the assumed engine believes in."""
     tolerance: float = 0.1
     """Of the moved disk's radius, within which its goal is reached."""
+    aim: float = 1.0
+    """Of the tolerance, within which the disk has to be seen before an episode ends:
+    sight is noisy, and less than 1 leaves room for that."""
     alignment: float = 3.0
     """Weight (m) of the cosine distance in the heuristic."""
     deadline: float | None = None
@@ -52,6 +55,7 @@ class ControlConfig:
         require_option(
             0 < self.tolerance < 1, "tolerance", "between 0 and 1", self.tolerance
         )
+        require_option(0 < self.aim <= 1, "aim", "above 0, at most 1", self.aim)
         require_option(self.alignment >= 0, "alignment", "0 or more", self.alignment)
         late = self.deadline is None or self.deadline > 0
         require_option(late, "deadline", "positive", self.deadline)

@@ -15,6 +15,7 @@ from sainet.robots.base import AbstractRobot, Recording
 from sainet.scene import Scene, State
 from sainet.tasks.base import AbstractTask
 
+SOLVED = "solved"  # why most episodes end
 _MOST_TROUBLES = 3  # in a row
 # How far a push may be from the one that was asked for.
 _TOLERANCES = (
@@ -75,7 +76,7 @@ def run_episode(
     while True:
         episode.final = state = robot.observe()
         if bool(np.isfinite(state.position).all() and task.is_solved(scene, state)):
-            return _end(episode, "solved")
+            return _end(episode, SOLVED)
         if len(episode.turns) == pushes:
             return _end(episode, _out_of_pushes(task, planner, episode, pushes))
         start = time.perf_counter()

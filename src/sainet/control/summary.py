@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from sainet.control.episode import SOLVED
+
 _NEAR_MM = 4.0
 _FEW_PUSHES = 25
 
@@ -18,6 +20,8 @@ def summarise(records: Records) -> dict[str, Any]:
     pushes = np.array([record["pushes"] for record in records])
     final = np.array([record["final_mm"] for record in records])
     seconds = [s for record in records for s in record["decision_s"]]
+    # Seen within the tolerance, and truly without: sight is noisy.
+    ended = np.array([record["reason"] == SOLVED for record in records])
     interval = binomtest(int(solved.sum()), len(solved)).proportion_ci(method="wilson")
     return {
         "trials": len(records),
@@ -29,6 +33,7 @@ def summarise(records: Records) -> dict[str, Any]:
         "within_4_mm": float((final <= _NEAR_MM).mean()),
         "within_25_pushes": float((solved & (pushes <= _FEW_PUSHES)).mean()),
         "median_final_mm": float(np.median(final)),
+        "ended_early": int((ended & ~solved).sum()),
     }
 
 

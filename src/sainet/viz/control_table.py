@@ -50,10 +50,16 @@ def control_markdown(result: Mapping[str, Any]) -> str:
 
 
 def sentences(result: Mapping[str, Any]) -> list[str]:
-    """Say of each pair of models which goals one solved and the other did not."""
+    """Say which goals one model solved and another did not, and what sight missed."""
     pairs = list(result.get("pairs") or ())
     labels = _labels(result)
-    return [
+    early = [
+        f"{row['group']}, {labels[row['model']]}: {row['ended_early']} of "
+        f"{row['trials'] - row['solved']} not solved ended as the disk was seen there"
+        for row in result["rows"]
+        if row["ended_early"]
+    ]
+    return early + [
         f"{pair['group']}: {labels[pair['model']]} alone solved {pair['only_one']}, "
         f"{labels[pair['against']]} alone {pair['only_other']} "
         f"(exact McNemar p = {pair['p']:.2g})"
