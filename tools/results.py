@@ -151,10 +151,7 @@ def _tuning() -> str:
         f"| way | {head} |",
         "| :-- |" + " --: |" * len(starts),
     ]
-    lines += [
-        f"| {change or 'nothing'} | {' | '.join(row)} |"
-        for change, row in scores.items()
-    ]
+    lines += [f"| {change} | {' | '.join(row)} |" for change, row in scores.items()]
     least = min(found["choices"], key=lambda choice: choice["score"])
     usual = ", ".join(
         f"{_told(name)} {getattr(FINE_TUNING, name):g}"

@@ -25,9 +25,9 @@ from sainet.models.features import (
 WIDTHS = (128, 64, 32, 16)
 EFFECT = WIDTHS[-1]
 FEATURE_BOUND = 4.0  # standard deviations
-# Time constant of a residual network's deviation from the engine's rates, s. Friction
-# stops what is pushed as fast; without it whatever f_dyn says adds up for seconds.
-FADING = 0.1
+# Of a residual network's deviation from the engine's rates, s. Friction stops what is
+# pushed as fast; without it whatever f_dyn says adds up for seconds.
+RELAXATION_TIME = 0.1
 _CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
 
 
@@ -79,7 +79,10 @@ class Scales(eqx.Module):
 
 
 class InteractionNetwork(eqx.Module):
-    """Predicts the next motion of any number of bodies."""
+    """Predicts the next motion of any number of bodies.
+
+    By itself, as in the paper, or as a residual on the engine's, see `step`.
+    """
 
     rel: Layers  # f_rel
     dyn: Layers  # f_dyn, which ends in a linear read-out of the accelerations
@@ -158,7 +161,7 @@ class InteractionNetwork(eqx.Module):
         if self.residual:
             simulated = drive.simulated_pose_step / self.time_step  # over this step
             deviation = rate - (simulated - drive.simulated_rate_step)
-            rate = simulated + math.exp(-self.time_step / FADING) * deviation
+            rate = simulated + math.exp(-self.time_step / RELAXATION_TIME) * deviation
         rate = rate + self.time_step * change
         pose = motion[0:3] + self.time_step * rate
         return jnp.concatenate([pose, rate])
