@@ -249,7 +249,8 @@ def test_what_cannot_be_gone_on_from_is_refused(store, start, tmp_path):
     with pytest.raises(BadCheckpoint, match="model is 'in', this training's is 'sain'"):
         fit("sain", store, TUNING, out, start_from=str(start / "in"))
     for name in ("nowhere", "physics"):
-        with pytest.raises(UnknownName, match=f"No model named '{name}'"):
+        says = f"--start-from is '{name}'; it must be engine, in, sain, .*folder"
+        with pytest.raises(UnknownName, match=says):
             fit("in", store, TUNING, out, start_from=name)
     assert not out.exists()
 

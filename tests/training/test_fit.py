@@ -214,7 +214,8 @@ def test_a_loss_that_is_no_number_stops_the_training(store, tmp_path, monkeypatc
 
 
 def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
-    with pytest.raises(BadStore, match="assumed_engines has no 'bullet'"):
+    says = "assumed_engines has no 'bullet'; give --assumed-engine planar, which it has"
+    with pytest.raises(BadStore, match=says):
         fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
     assert not (tmp_path / "out").exists()
 

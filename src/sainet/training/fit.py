@@ -14,12 +14,12 @@ from jaxtyping import Array
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
-from sainet.errors import Diverged
+from sainet.errors import Diverged, UnknownName
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_network
 from sainet.models.interaction import InteractionNetwork
-from sainet.models.registry import network_folder
+from sainet.models.registry import SHIPPED, network_folder
 from sainet.runs import (
     MANIFEST,
     RunFolder,
@@ -123,6 +123,12 @@ def fit(
 def _start(name: str | None) -> Start | None:
     if name is None:
         return None
+    if name not in SHIPPED and not Path(name).exists():
+        known = ", ".join((FROM_ENGINE, *SHIPPED))
+        raise UnknownName(
+            f"--start-from is {name!r}; it must be {known}, or the folder of a trained "
+            "network."
+        )
     folder = network_folder(name)
     return Start(*load_network(folder), folder)
 

@@ -158,8 +158,9 @@ def _check_assumed(task: Task) -> None:
     info, path, name = task.store.info, task.store.path, task.assumed.name
     if task.assumed.is_stored and name not in info.assumed_engines:
         raise BadStore(
-            f"{path}: assumed_engines has no {name!r}; generate the data with "
-            f"--assumed-engine {name}, or give the folder of an identified engine."
+            f"{path}: assumed_engines has no {name!r}; give --assumed-engine "
+            f"{' or '.join(info.assumed_engines)}, which it has, or the folder of an "
+            "identified engine."
         )
     if not task.assumed.is_stored and info.kind != "robot":
         raise BadStore(
