@@ -1,6 +1,7 @@
 """Dynamics models behind one `predict`: physics, the network, and both together."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -172,6 +173,7 @@ def predict_motion(
     *,
     simulated_start: Float[Array, "push body 6"] | None = None,
     simulated: Float[Array, "push time body 6"] | None = None,
+    unroll: Callable[..., Array] = unroll,
 ) -> Float[Array, "time push body 6"]:
     """Unroll a network in the push frame; the result stays in that frame.
 
@@ -182,6 +184,7 @@ def predict_motion(
         controls: in the table's frame.
         simulated_start: packed motion that s-bar goes on from, table's frame.
         simulated: packed s-bar after each step, table's frame; None for IN.
+        unroll: how; training has another way.
     """
     frame = carry.frame
     start = motion_to_frame(pack_motion(carry.predicted), frame)

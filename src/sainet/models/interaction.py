@@ -31,6 +31,11 @@ RELAXATION_TIME = 0.1
 _CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
 
 
+def relaxation(time_step: float) -> float:
+    """Return the share of a residual network's deviation that a step (s) leaves."""
+    return math.exp(-time_step / RELAXATION_TIME)
+
+
 class Layers(eqx.Module):
     """Linear layers with ReLU after all but the last."""
 
@@ -161,7 +166,7 @@ class InteractionNetwork(eqx.Module):
         if self.residual:
             simulated = drive.simulated_pose_step / self.time_step  # over this step
             deviation = rate - (simulated - drive.simulated_rate_step)
-            rate = simulated + math.exp(-self.time_step / RELAXATION_TIME) * deviation
+            rate = simulated + relaxation(self.time_step) * deviation
         rate = rate + self.time_step * change
         pose = motion[0:3] + self.time_step * rate
         return jnp.concatenate([pose, rate])

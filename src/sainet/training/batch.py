@@ -1,5 +1,7 @@
 """A stored batch as a network trains on it: everything in the push frame."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -7,15 +9,23 @@ from jaxtyping import Array, Float
 from sainet.datasets.batch import PushBatch
 from sainet.models.dynamics import LearnedCarry, predict_motion
 from sainet.models.frame import PushFrame, motion_to_frame, push_frame
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.interaction import InteractionNetwork, unroll
 from sainet.scene import pack_motion
+from sainet.training.held import unroll_held
 from sainet.training.loss import Target
 
 
 def predict_batch(
-    network: InteractionNetwork, batch: PushBatch
+    network: InteractionNetwork, batch: PushBatch, hold: int = 1
 ) -> Float[Array, "time push body 6"]:
-    """Predict each push recurrently from its start, with the stored s-bar (eq. 1)."""
+    """Predict each push recurrently from its start, with the stored s-bar (eq. 1).
+
+    Args:
+        network: IN or SAIN.
+        batch: of pushes, with s-bar if it is SAIN.
+        hold: steps over which what a residual network says is held.
+    """
+    is_held = network.residual and hold > 1
     carry = LearnedCarry(batch.initial, push_frame(batch.scene, batch.initial))
     start = pack_motion(batch.initial) if network.sizes.augmented else None
     simulated = batch.simulated if network.sizes.augmented else None
@@ -26,6 +36,7 @@ def predict_batch(
         batch.controls,
         simulated_start=start,
         simulated=simulated,
+        unroll=partial(unroll_held, hold=hold) if is_held else unroll,
     )
 
 

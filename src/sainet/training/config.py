@@ -29,6 +29,10 @@ class FitConfig:
     squares of what is changed are meant."""
     steps: int = 200
     """Steps of a push that are trained on; pushes of 600 steps, say, need 600."""
+    hold: int = 1
+    """Steps over which what a residual network says is held in training: it is asked
+    so many times less often. Predictions never hold it; other networks are never
+    held."""
     recurrent: bool = True
     """Train on whole pushes; otherwise on single steps, each from the true state (the
     paper's figure 2c)."""
@@ -73,7 +77,7 @@ class FitConfig:
 
     def __post_init__(self) -> None:
         """Refuse settings that no training can have."""
-        for name in ("iterations", "batch_size", "halve_every", "steps"):
+        for name in ("iterations", "batch_size", "halve_every", "steps", "hold"):
             require_option(
                 getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
             )
@@ -106,6 +110,7 @@ FINE_TUNING = FitConfig(
     batch_size=50,
     halve_every=200,
     steps=10_000,
+    hold=8,
     terms="error",
     linear_from=0.5,
     mirror=True,

@@ -81,15 +81,15 @@ def _averaged(
 
 
 def data_loss(
-    network: InteractionNetwork, batch: PushBatch, weights: LossWeights
+    network: InteractionNetwork, batch: PushBatch, weights: LossWeights, hold: int = 1
 ) -> Array:
-    """Return the sum of the losses of the pushes of a batch."""
-    predicted = predict_batch(network, batch)
+    """Return the sum of the losses of the pushes of a batch (see `predict_batch`)."""
+    predicted = predict_batch(network, batch, hold)
     return jnp.sum(push_losses(predicted, to_target(batch), weights))
 
 
 def make_gradient(
-    weights: LossWeights,
+    weights: LossWeights, hold: int = 1
 ) -> Callable[[InteractionNetwork, PushBatch], tuple[Array, Trained]]:
     """Return a function that sums loss and gradient over a batch on all devices.
 
@@ -103,20 +103,21 @@ def make_gradient(
     def gradient(
         network: InteractionNetwork, batch: PushBatch
     ) -> tuple[Array, Trained]:
-        sums = _sum_on_devices(weights, jax.device_put(network, everywhere), batch)
+        network = jax.device_put(network, everywhere)
+        sums = _sum_on_devices(weights, network, batch, hold)
         return _total(jax.device_put(sums, jax.devices()[0]))
 
     return gradient
 
 
 # Compiled once for each set of shapes, whatever the weights, seed and settings are.
-@jax.jit
+@partial(jax.jit, static_argnames="hold")
 def _sum_on_devices(
-    weights: LossWeights, network: InteractionNetwork, batch: PushBatch
+    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
 ) -> tuple[Array, Trained]:
     """Return loss and gradient of each device's part of a batch, device first."""
     split = jax.shard_map(
-        _sum_of_part,
+        partial(_sum_of_part, hold=hold),
         mesh=batch_mesh(),
         in_specs=(PartitionSpec(), PartitionSpec(), PartitionSpec(BATCH)),
         out_specs=PartitionSpec(BATCH),
@@ -126,10 +127,10 @@ def _sum_on_devices(
 
 
 def _sum_of_part(
-    weights: LossWeights, network: InteractionNetwork, batch: PushBatch
+    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, *, hold: int
 ) -> tuple[Array, Trained]:
     def loss(layers: Trained) -> Array:
-        return data_loss(with_layers(network, layers), batch, weights)
+        return data_loss(with_layers(network, layers), batch, weights, hold)
 
     found = jax.value_and_grad(loss)(trained_layers(network))
     return jax.tree.map(lambda x: x[None], found)
@@ -151,7 +152,7 @@ def make_step(
     (see `even_batch`), and returns the next state and the mean loss of the pushes, l2
     left out.
     """
-    gradient = make_gradient(weights)
+    gradient = make_gradient(weights, config.hold)
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)

@@ -32,6 +32,7 @@ FROM_ENGINE = "engine"  # where a network starts that corrects the engine from n
 _ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
 # Settings that came later: a folder from before, which lacks them, had these.
 _LATER = {
+    "hold": 1,
     "recurrent": True,
     "features": "paper",
     "terms": "motion",

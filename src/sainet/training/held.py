@@ -1,0 +1,113 @@
+"""Training the residual form on long strokes: what the network says is held.
+
+What a residual network adds to the engine is small and changes slowly, while a stroke
+has a thousand steps. In training it is asked every few steps only, and what it says
+holds until it is asked again; the motion that follows from that is exact. Networks that
+say the whole motion cannot be held: they brake and kick within a step.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Float
+
+from sainet.models.bounded import bound_gradient
+from sainet.models.features import Drive, Still, in_columns
+from sainet.models.interaction import InteractionNetwork, relaxation
+
+
+def unroll_held(
+    network: InteractionNetwork,
+    initial: Float[Array, "push body 6"],
+    still: Still,
+    drive: Drive,
+    *,
+    hold: int,
+) -> Float[Array, "time push body 6"]:
+    """Predict like `unroll`, asking a residual network every few steps.
+
+    Args:
+        network: of the residual form.
+        initial: packed motion at the start, of engine and network alike.
+        still: for each push.
+        drive: with axes ``[push, time, ...]``.
+        hold: steps over which f_dyn is held; 1 is what `unroll` does.
+    """
+    simulated = _simulated(initial, drive)
+    still, held = in_columns(still), _Held(network.time_step, hold)
+    asked = jax.vmap(in_columns)(_time_first(_each(drive, hold)))
+    before = jax.vmap(in_columns)(_time_first(simulated[:, :-1:hold]))
+
+    @jax.checkpoint
+    def body(deviation: Array, now: tuple[Array, Drive]) -> tuple[Array, Array]:
+        engine, seen = now
+        deviation = bound_gradient(deviation)
+        change = network.acceleration(engine + deviation, still, seen)
+        path = held.path(deviation, change)
+        return path[-1], path
+
+    nothing = jnp.zeros_like(before[0])
+    path = lax.scan(body, nothing, (before, asked))[1]  # [block, step, 6, body, push]
+    steps = simulated.shape[1] - 1
+    deviation = jax.vmap(in_columns)(path.reshape(-1, *path.shape[2:])[:steps])
+    return _time_first(simulated[:, 1:]) + deviation
+
+
+class _Held:
+    """How a deviation from the engine goes on while an acceleration is held."""
+
+    def __init__(self, time_step: float, hold: int) -> None:
+        fades = relaxation(time_step) ** np.arange(1, hold + 1)
+        gains = time_step * np.cumsum(np.append(1.0, fades[:-1]))
+        self.rate_of_rate, self.rate_of_change = fades, gains
+        self.pose_of_rate = time_step * np.cumsum(fades)
+        self.pose_of_change = time_step * np.cumsum(gains)
+
+    def path(
+        self,
+        deviation: Float[Array, "6 body push"],
+        change: Float[Array, "3 body push"],
+    ) -> Float[Array, "step 6 body push"]:
+        """Return the deviation after each step."""
+        each = lambda numbers, x: jnp.asarray(numbers, x.dtype)[:, None, None, None] * x  # noqa: E731
+        pose, rate = deviation[:3], deviation[3:]
+        pose = pose + each(self.pose_of_rate, rate) + each(self.pose_of_change, change)
+        rate = each(self.rate_of_rate, rate) + each(self.rate_of_change, change)
+        return jnp.concatenate([pose, rate], axis=1)
+
+
+def _simulated(
+    initial: Float[Array, "push body 6"], drive: Drive
+) -> Float[Array, "push time+1 body 6"]:
+    """Return s-bar, packed, from the start on."""
+    step = jnp.concatenate([drive.simulated_pose_step, drive.simulated_rate_step], -1)
+    return jnp.cumsum(jnp.concatenate([initial[:, None], step], axis=1), axis=1)
+
+
+def _each(drive: Drive, hold: int) -> Drive:
+    """Return what the network is shown whenever it is asked.
+
+    The command is that of the first step; the engine's step is the mean over those to
+    come, for contact kicks in one alone.
+    """
+    return Drive(
+        drive.action[:, ::hold],
+        drive.pusher[:, ::hold],
+        _mean(drive.simulated_pose_step, hold),
+        _mean(drive.simulated_rate_step, hold),
+    )
+
+
+def _mean(
+    step: Float[Array, "push time body 3"], hold: int
+) -> Float[Array, "push block body 3"]:
+    """Return means over so many steps; beyond its end a push stands still."""
+    missing = -step.shape[1] % hold
+    step = jnp.pad(step, [(0, 0), (0, missing), (0, 0), (0, 0)])
+    blocks = step.reshape(step.shape[0], -1, hold, *step.shape[2:])
+    return jnp.mean(blocks, axis=2)
+
+
+def _time_first(tree):  # noqa: ANN001, ANN202
+    return jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), tree)
