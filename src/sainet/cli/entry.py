@@ -3,6 +3,7 @@
 import logging
 import sys
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Annotated, Any
 
 import tyro
@@ -18,14 +19,16 @@ from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
 from sainet.cli.output import finish
 from sainet.cli.reproduce import Reproduce
-from sainet.cli.train import Train, fine_tuning
+from sainet.cli.train import Train, going_on
 from sainet.errors import SainetError
 
 
 def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
     """Return the type of all commands, with the defaults that hold for these words."""
-    tuned = any(word.partition("=")[0] == "--start-from" for word in words)
-    train = subcommand("train", default=fine_tuning()) if tuned else subcommand("train")
+    start = _start_from(words)
+    train = (
+        subcommand("train", default=going_on(start)) if start else subcommand("train")
+    )
     return (
         Annotated[Demo, subcommand("demo")]
         | Annotated[Generate, subcommand("generate")]
@@ -37,6 +40,15 @@ def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
         | Annotated[Reproduce, subcommand("reproduce")]
         | Annotated[Bench, subcommand("bench")]
     )
+
+
+def _start_from(words: Sequence[str]) -> str | None:
+    """Return what --start-from is given, if it is there: it decides the defaults."""
+    for word, following in zip_longest(words, words[1:], fillvalue=""):
+        name, equals, value = word.partition("=")
+        if name.replace("_", "-") == "--start-from":
+            return value if equals else following or "nothing"
+    return None
 
 
 _DESCRIPTION = """Simulator-augmented interaction networks: teach a physics engine what

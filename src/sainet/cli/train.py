@@ -10,7 +10,13 @@ from tyro.conf import Positional
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.training.config import FINE_TUNING, FitConfig, ModelKind
+from sainet.training.config import (
+    ADDING,
+    FINE_TUNING,
+    FROM_ENGINE,
+    FitConfig,
+    ModelKind,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +36,7 @@ class Train:
     """Network to go on from: a shipped one or the folder of a trained one; or engine:
     a new one that adds to the assumed engine's motion, nothing at first. Other defaults
     hold then, for few recorded pushes: 'sainet train --start-from engine --help' shows
-    them."""
+    them, and with the name of a network the others."""
     pushes: int | None = None
     """Pushes at the start of the dataset to train on; default: all."""
     config: FitConfig = field(default_factory=FitConfig)
@@ -71,7 +77,8 @@ class Train:
         return {"out": str(self.out), "model": self.model, "loss": loss}
 
 
-def fine_tuning() -> Train:
-    """Return the defaults that hold when training goes on from a network."""
+def going_on(start_from: str) -> Train:
+    """Return the defaults that hold when training goes on from a network or engine."""
     needed: Any = tyro.MISSING
-    return Train(model=needed, data=needed, out=needed, config=FINE_TUNING)
+    config = ADDING if start_from == FROM_ENGINE else FINE_TUNING
+    return Train(model=needed, data=needed, out=needed, config=config)

@@ -12,8 +12,7 @@ from sainet.experiments.paper_setup import join
 from sainet.experiments.stand_in import ROBOTS, Robot, recordings
 from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
-from sainet.training.config import FINE_TUNING
-from sainet.training.task import FROM_ENGINE
+from sainet.training.config import FINE_TUNING, FROM_ENGINE
 
 STARTS = ("sain-stroke", FROM_ENGINE)
 # The defaults, and what else they could be, one thing at a time.

@@ -18,14 +18,20 @@ from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import load_dynamics, network_folder
-from sainet.training.config import FINE_TUNING, Features, FitConfig, ModelKind
-from sainet.training.task import FROM_ENGINE
+from sainet.training.config import (
+    ADDING,
+    FINE_TUNING,
+    FROM_ENGINE,
+    Features,
+    FitConfig,
+    ModelKind,
+)
 
 IDENTIFIED = "physics-identified"
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
 _STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
-_ITERATIONS = {"quick": 20, "paper": FINE_TUNING.iterations}
+_QUICK_ITERATIONS = 20
 
 
 @dataclass(frozen=True)
@@ -107,13 +113,11 @@ class Tuner:
         return replace(model, dynamics=with_camera(around, beliefs))
 
     def _config(self, variant: Variant) -> FitConfig:
-        count = self.training.info.pushes
-        return replace(
-            FINE_TUNING,
-            iterations=_ITERATIONS[self.scale],
-            batch_size=min(FINE_TUNING.batch_size, count),
-            features=variant.features,
-        )
+        config = ADDING if variant.learned == "residual" else FINE_TUNING
+        if self.scale == "quick":
+            config = replace(config, iterations=_QUICK_ITERATIONS)
+        size = min(config.batch_size, self.training.info.pushes)
+        return replace(config, batch_size=size, features=variant.features)
 
     def _identified(self) -> Path:
         """Return the folder of the engine with what the training pushes tell of it."""

@@ -4,8 +4,6 @@ One class is both IN and SAIN; they differ in whether the features hold the simu
 prediction (eq. 4 to 7 and 8 to 12 of the paper).
 """
 
-import math
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -21,19 +19,12 @@ from sainet.models.features import (
     in_columns,
     pair_features,
 )
+from sainet.models.relaxation import relaxation
 
 WIDTHS = (128, 64, 32, 16)
 EFFECT = WIDTHS[-1]
 FEATURE_BOUND = 4.0  # standard deviations
-# Of a residual network's deviation from the engine's rates, s. Friction stops what is
-# pushed as fast; without it whatever f_dyn says adds up for seconds.
-RELAXATION_TIME = 0.1
 _CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
-
-
-def relaxation(time_step: float) -> float:
-    """Return the share of a residual network's deviation that a step (s) leaves."""
-    return math.exp(-time_step / RELAXATION_TIME)
 
 
 class Layers(eqx.Module):

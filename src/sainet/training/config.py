@@ -1,7 +1,7 @@
 """Settings of training, free of JAX."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from sainet.errors import require_option
@@ -9,6 +9,7 @@ from sainet.errors import require_option
 ModelKind = Literal["in", "sain"]
 Features = Literal["paper", "place"]
 Terms = Literal["motion", "error"]
+FROM_ENGINE = "engine"  # where a network starts that corrects the engine from nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,18 +104,20 @@ class FitConfig:
             )
 
 
-# For what goes on from the engine or a network, on few recorded pushes: chosen on
+# For what goes on from a network, or from the engine, on few recorded pushes: chosen on
 # simulated ones that stand in for them (`sainet reproduce fine-tuning`).
 FINE_TUNING = FitConfig(
     iterations=300,
     batch_size=50,
     halve_every=200,
     steps=10_000,
-    hold=8,
     terms="error",
     linear_from=0.5,
     mirror=True,
     average=100,
     l2=1e-3,
     log_every=25,
+)
+ADDING = replace(
+    FINE_TUNING, iterations=1200, halve_every=800, hold=8, weight_rotation=2.0
 )

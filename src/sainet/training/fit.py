@@ -105,7 +105,8 @@ def fit(
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
     state, weights = begin(task)
-    drawn_to = trained_layers(state.network) if task.start else None
+    goes_on = task.start is not None or task.from_engine
+    drawn_to = trained_layers(state.network) if goes_on else None
     validate = _make_validation(task, weights)
     best = Best.first(state.network, validate(state.network)) if validate else None
     if (out / STATE).is_file():

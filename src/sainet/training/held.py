@@ -14,7 +14,8 @@ from jaxtyping import Array, Float
 
 from sainet.models.bounded import bound_gradient
 from sainet.models.features import Drive, Still, in_columns
-from sainet.models.interaction import InteractionNetwork, relaxation
+from sainet.models.interaction import InteractionNetwork
+from sainet.models.relaxation import Gains, gains
 
 
 def unroll_held(
@@ -35,7 +36,7 @@ def unroll_held(
         hold: steps over which f_dyn is held; 1 is what `unroll` does.
     """
     simulated = _simulated(initial, drive)
-    still, held = in_columns(still), _Held(network.time_step, hold)
+    still, gain = in_columns(still), gains(network.time_step, hold)
     asked = jax.vmap(in_columns)(_time_first(_each(drive, hold)))
     before = jax.vmap(in_columns)(_time_first(simulated[:, :-1:hold]))
 
@@ -44,7 +45,7 @@ def unroll_held(
         engine, seen = now
         deviation = bound_gradient(deviation)
         change = network.acceleration(engine + deviation, still, seen)
-        path = held.path(deviation, change)
+        path = _held(deviation, change, gain)
         return path[-1], path
 
     nothing = jnp.zeros_like(before[0])
@@ -54,27 +55,20 @@ def unroll_held(
     return _time_first(simulated[:, 1:]) + deviation
 
 
-class _Held:
-    """How a deviation from the engine goes on while an acceleration is held."""
+def _held(
+    deviation: Float[Array, "6 body push"],
+    change: Float[Array, "3 body push"],
+    gain: Gains,
+) -> Float[Array, "step 6 body push"]:
+    """Return the deviation after each step for which the change is held."""
 
-    def __init__(self, time_step: float, hold: int) -> None:
-        fades = relaxation(time_step) ** np.arange(1, hold + 1)
-        gains = time_step * np.cumsum(np.append(1.0, fades[:-1]))
-        self.rate_of_rate, self.rate_of_change = fades, gains
-        self.pose_of_rate = time_step * np.cumsum(fades)
-        self.pose_of_change = time_step * np.cumsum(gains)
+    def each(numbers: np.ndarray, x: Array) -> Array:
+        return jnp.asarray(numbers, x.dtype)[:, None, None, None] * x
 
-    def path(
-        self,
-        deviation: Float[Array, "6 body push"],
-        change: Float[Array, "3 body push"],
-    ) -> Float[Array, "step 6 body push"]:
-        """Return the deviation after each step."""
-        each = lambda numbers, x: jnp.asarray(numbers, x.dtype)[:, None, None, None] * x  # noqa: E731
-        pose, rate = deviation[:3], deviation[3:]
-        pose = pose + each(self.pose_of_rate, rate) + each(self.pose_of_change, change)
-        rate = each(self.rate_of_rate, rate) + each(self.rate_of_change, change)
-        return jnp.concatenate([pose, rate], axis=1)
+    pose, rate = deviation[:3], deviation[3:]
+    pose = pose + each(gain.pose_of_rate, rate) + each(gain.pose_of_change, change)
+    rate = each(gain.rate_of_rate, rate) + each(gain.rate_of_change, change)
+    return jnp.concatenate([pose, rate], axis=1)
 
 
 def _simulated(

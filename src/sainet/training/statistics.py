@@ -16,6 +16,7 @@ from sainet.models.features import (
 )
 from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
 from sainet.models.interaction import Scales
+from sainet.models.relaxation import gains
 from sainet.scene import pack_motion
 from sainet.training.batch import path_to_frame
 from sainet.training.config import FitConfig
@@ -27,8 +28,14 @@ _STILL = 1e-14  # a mean square (m^2, say) below this is rounding
 
 
 @eqx.filter_jit
-def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
-    """Return means and deviations of what a network sees along the true paths."""
+def feature_scales(
+    batch: PushBatch, sizes: FeatureSizes, *, residual: bool = False
+) -> Scales:
+    """Return means and deviations of what a network sees along the true paths.
+
+    What it says is measured by how the bodies accelerate, or, if it is added to the
+    engine's motion, by what corrects the engine.
+    """
     frame = push_frame(batch.scene, batch.initial)
     motion = path_to_frame(_known_motion(batch), frame)
     start = motion_to_frame(pack_motion(batch.initial), frame)
@@ -49,6 +56,7 @@ def feature_scales(batch: PushBatch, sizes: FeatureSizes) -> Scales:
         pair_mean, pair_deviation = jnp.zeros(sizes.pair), jnp.ones(sizes.pair)
     change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
     size = jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
+    size = _correction(batch) if residual else size
     return Scales(
         pair_mean=pair_mean,
         pair_deviation=pair_deviation,
@@ -106,6 +114,18 @@ def _errors(batch: PushBatch) -> tuple[Array, Array]:
         where(batch.pose_observed, error[..., 0:3]),
         where(batch.rate_observed, error[..., 3:6]),
     )
+
+
+def _correction(batch: PushBatch) -> Array:
+    """Return the acceleration that, held, makes an error as large as s-bar's is.
+
+    By mean absolute errors, which failed recordings do not rule.
+    """
+    pose, _ = _errors(batch)
+    gain = jnp.asarray(gains(batch.scene.time_step, pose.shape[1]).pose_of_change)
+    reached = jnp.where(jnp.isnan(pose), jnp.nan, gain[:, None, None])
+    size = jnp.nanmean(jnp.abs(pose), axis=(0, 1, 2))
+    return _nonzero(size / jnp.nanmean(reached, axis=(0, 1, 2)))
 
 
 def _nonzero(square: Array) -> Array:

@@ -18,7 +18,7 @@ from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork, Scales
 from sainet.models.widen import widen
 from sainet.training.assumed import AssumedEngine
-from sainet.training.config import FitConfig, ModelKind
+from sainet.training.config import FROM_ENGINE, FitConfig, ModelKind
 from sainet.training.loss import LossWeights
 from sainet.training.mirror import mirror_some
 from sainet.training.single_steps import to_single_steps
@@ -28,7 +28,6 @@ from sainet.training.step import FitState, first_state
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
 _PLANAR = "planar"  # what an identified engine is with other numbers
-FROM_ENGINE = "engine"  # where a network starts that corrects the engine from nothing
 _ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
 # Settings that came later: a folder from before, which lacks them, had these.
 _LATER = {
@@ -249,7 +248,8 @@ def begin(task: Task) -> tuple[FitState, LossWeights]:
     store, config = task.training, task.config
     few = slice(0, min(_STATISTICS_PUSHES, store.info.pushes))
     sample = task.to_sample(store.read(few, task.names))
-    network = _first_network(task, feature_scales(sample, task.sizes))
+    scales = feature_scales(sample, task.sizes, residual=task.from_engine)
+    network = _first_network(task, scales)
     return first_state(network, config), loss_weights(sample, config)
 
 
