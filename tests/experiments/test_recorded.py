@@ -130,8 +130,7 @@ def test_ways_to_tune_are_compared_over_robots(make, monkeypatch):
     one = {"learning_rate": 1e-3, "mirror": False}
     robots = (Robot("a", believed_friction=0.25), Robot("b", unexplained=0))
     monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
-    monkeypatch.setattr(fine_tuning, "STARTS", ("engine",))
-    monkeypatch.setattr(fine_tuning, "CHANGES", (one,))
+    monkeypatch.setattr(fine_tuning, "WAYS", (("engine", one),))
     monkeypatch.setattr(fine_tuning, "_QUICK_ITERATIONS", 1)
     monkeypatch.setattr(fine_tuning, "_TESTS", {"quick": 4})
     table = make("fine-tuning")

@@ -12,24 +12,27 @@ from sainet.experiments.paper_setup import join
 from sainet.experiments.stand_in import ROBOTS, Robot, recordings
 from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
-from sainet.training.config import FINE_TUNING, FROM_ENGINE
+from sainet.training.config import ADDING, FINE_TUNING, FROM_ENGINE
 
-STARTS = ("sain-stroke", FROM_ENGINE)
+Change = dict[str, Any]
+
 # The defaults, and what else they could be, one thing at a time.
-CHANGES: tuple[dict[str, Any], ...] = (
+CHANGES: tuple[Change, ...] = (
     {},
+    {"features": "place"},
     {"learning_rate": 3e-4},
     {"learning_rate": 3e-3},
-    {"iterations": 150},
-    {"iterations": 600},
-    {"l2": 1e-6},
+    {"iterations": 300, "halve_every": 200},
+    {"l2": 1e-4},
     {"l2": 1e-2},
     {"linear_from": 0.0},
-    {"linear_from": 1.0},
+    {"weight_rotation": 1.0},
     {"mirror": False},
     {"average": 0},
-    {"validation_share": 0.2, "patience": 250, "iterations": 800},
+    {"hold": 1},
+    {"validation_share": 0.2, "patience": 250},
 )
+WAYS = (("sain-stroke", {}), *product([FROM_ENGINE], CHANGES))
 _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
 _QUICK_ITERATIONS = 20
 
@@ -43,7 +46,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         `score` is the mean over the robots.
     """
     tables, choices = [], []
-    for start, change in product(STARTS, CHANGES):
+    for start, change in WAYS:
         found = {
             robot.name: _tune(robot, start, change, scale, chain) for robot in ROBOTS
         }
@@ -59,16 +62,17 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
 
 
 def _tune(
-    robot: Robot, start: str, change: dict[str, Any], scale: Scale, chain: Chain
+    robot: Robot, start: str, change: Change, scale: Scale, chain: Chain
 ) -> dict[str, Any]:
     """Tune on the recordings of a robot; returns the table of its tests."""
     training = recordings(robot, "training", _TRAINING[scale], 0, chain)
     tests = recordings(robot, "tests", _TESTS[scale], 1, chain)
-    size = min(FINE_TUNING.batch_size, training.info.pushes)
-    config = replace(FINE_TUNING, batch_size=size, **change)
+    usual = ADDING if start == FROM_ENGINE else FINE_TUNING
+    size = min(usual.batch_size, training.info.pushes)
+    config = replace(usual, batch_size=size, **change)
     if scale == "quick":
         config = replace(config, iterations=_QUICK_ITERATIONS)
-    way = "-".join([start, *(f"{key}-{value:g}" for key, value in change.items())])
+    way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
     name = f"{robot.name}/{way}"
     result = chain.train("sain", training, config, name=name, start_from=start)
     tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")

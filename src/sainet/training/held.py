@@ -63,17 +63,19 @@ def _held(
     """Return the deviation after each step for which the change is held."""
 
     def each(numbers: np.ndarray, x: Array) -> Array:
-        return jnp.asarray(numbers, x.dtype)[:, None, None, None] * x
+        return jnp.asarray(numbers, x.dtype)[:, None, None, None] * x[None]
 
     pose, rate = deviation[:3], deviation[3:]
-    pose = pose + each(gain.pose_of_rate, rate) + each(gain.pose_of_change, change)
+    pose = (
+        pose[None] + each(gain.pose_of_rate, rate) + each(gain.pose_of_change, change)
+    )
     rate = each(gain.rate_of_rate, rate) + each(gain.rate_of_change, change)
     return jnp.concatenate([pose, rate], axis=1)
 
 
 def _simulated(
     initial: Float[Array, "push body 6"], drive: Drive
-) -> Float[Array, "push time+1 body 6"]:
+) -> Float[Array, "push state body 6"]:
     """Return s-bar, packed, from the start on."""
     step = jnp.concatenate([drive.simulated_pose_step, drive.simulated_rate_step], -1)
     return jnp.cumsum(jnp.concatenate([initial[:, None], step], axis=1), axis=1)
