@@ -163,6 +163,8 @@ def test_going_on_from_a_network_has_defaults_of_its_own():
     assert "Number of gradient steps. (default: 300)" in tuned
     assert "(default: error)" in tuned
     assert shown("train", "in", "--start-from=in") == tuned
+    added = shown("train", "sain", "--start_from", "engine")
+    assert "Number of gradient steps. (default: 1200)" in added
 
 
 def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from sainet.engines.identified import FILE
 from sainet.errors import BadInput
 from sainet.experiments import (
+    few_pushes,
     fine_tuning,
     load_experiment,
     recorded_efficiency,
@@ -18,7 +19,6 @@ from sainet.experiments.recorded_models import Variant, surfaces_of
 from sainet.experiments.stand_in import Robot
 from sainet.models.card import read_card
 from sainet.runs import read_json, write_json
-from sainet.training.config import FINE_TUNING
 from training.stores import end_points_alone, info_of, made_up, write
 
 FEW = (
@@ -61,13 +61,13 @@ def make(chain, recorded, monkeypatch, tmp_path):
     monkeypatch.setattr(recorded_pushes, "ELSEWHERE", FEW[:2])
     monkeypatch.setattr(recorded_efficiency, "VARIANTS", FEW[1:2])
     monkeypatch.setattr(recorded_efficiency, "PUSHES", {"quick": (3, 5)})
-    models = "sainet.experiments.recorded_models"
-    monkeypatch.setattr(f"{models}._ITERATIONS", {"quick": 1})
+    monkeypatch.setattr(few_pushes, "_QUICK_ITERATIONS", 1)
     # Of one size, so that everything compiles once.
-    few = replace(FINE_TUNING, batch_size=4)
-    monkeypatch.setattr(f"{models}.FINE_TUNING", few)
+    for name in ("FINE_TUNING", "ADDING"):
+        four = replace(getattr(few_pushes, name), batch_size=4)
+        monkeypatch.setattr(few_pushes, name, four)
     # It has tests of its own, and compiles for a minute.
-    monkeypatch.setattr(f"{models}.identify_into", identify)
+    monkeypatch.setattr("sainet.experiments.recorded_models.identify_into", identify)
     whole = replace(chain, recorded=recorded.path)
     return lambda name: load_experiment(name)(
         "quick", replace(whole, out=tmp_path / name)
@@ -131,7 +131,6 @@ def test_ways_to_tune_are_compared_over_robots(make, monkeypatch):
     robots = (Robot("a", believed_friction=0.25), Robot("b", unexplained=0))
     monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
     monkeypatch.setattr(fine_tuning, "WAYS", (("engine", one),))
-    monkeypatch.setattr(fine_tuning, "_QUICK_ITERATIONS", 1)
     monkeypatch.setattr(fine_tuning, "_TESTS", {"quick": 4})
     table = make("fine-tuning")
     rows = {(row["group"][0], row["model"]): row for row in table["rows"]}

@@ -8,11 +8,12 @@ import numpy as np
 
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
+from sainet.experiments.few_pushes import recipe
 from sainet.experiments.paper_setup import join
 from sainet.experiments.stand_in import ROBOTS, Robot, recordings
 from sainet.models.registry import load_dynamics
 from sainet.runs import write_json
-from sainet.training.config import ADDING, FINE_TUNING, FROM_ENGINE
+from sainet.training.config import FROM_ENGINE
 
 Change = dict[str, Any]
 
@@ -34,7 +35,6 @@ CHANGES: tuple[Change, ...] = (
 )
 WAYS = (("sain-stroke", {}), *product([FROM_ENGINE], CHANGES))
 _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
-_QUICK_ITERATIONS = 20
 
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
@@ -67,11 +67,7 @@ def _tune(
     """Tune on the recordings of a robot; returns the table of its tests."""
     training = recordings(robot, "training", _TRAINING[scale], 0, chain)
     tests = recordings(robot, "tests", _TESTS[scale], 1, chain)
-    usual = ADDING if start == FROM_ENGINE else FINE_TUNING
-    size = min(usual.batch_size, training.info.pushes)
-    config = replace(usual, batch_size=size, **change)
-    if scale == "quick":
-        config = replace(config, iterations=_QUICK_ITERATIONS)
+    config = recipe(start, scale, training.info.pushes, change)
     way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
     name = f"{robot.name}/{way}"
     result = chain.train("sain", training, config, name=name, start_from=start)

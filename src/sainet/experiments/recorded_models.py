@@ -12,6 +12,7 @@ from sainet.datasets.store import Store
 from sainet.engines.identified import beliefs_of, engine_of_beliefs, read_values
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
+from sainet.experiments.few_pushes import recipe
 from sainet.identification.identify import identify_into
 from sainet.models.camera import with_camera
 from sainet.models.checkpoint import load_network
@@ -19,11 +20,8 @@ from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import load_dynamics, network_folder
 from sainet.training.config import (
-    ADDING,
-    FINE_TUNING,
     FROM_ENGINE,
     Features,
-    FitConfig,
     ModelKind,
 )
 
@@ -31,7 +29,6 @@ IDENTIFIED = "physics-identified"
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
 _STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
-_QUICK_ITERATIONS = 20
 
 
 @dataclass(frozen=True)
@@ -93,15 +90,15 @@ class Tuner:
         if variant.learned == "simulation":
             found = load_dynamics(strokes)
             return self._around_identified(found) if is_identified else found
+        start = {"tuned": strokes, "residual": FROM_ENGINE}.get(variant.learned)
+        pushes, seen = self.training.info.pushes, {"features": variant.features}
         result = self.chain.train(
             variant.network,
             self.training,
-            self._config(variant),
+            recipe(start, self.scale, pushes, seen),
             name=f"{self.folder}/{variant.name}",
             assumed_engine=str(self._identified()) if is_identified else "planar",
-            start_from={"tuned": strokes, "residual": FROM_ENGINE, "real": None}[
-                variant.learned
-            ],
+            start_from=start,
         )
         return load_dynamics(str(result.folder))
 
@@ -111,13 +108,6 @@ class Tuner:
         beliefs = beliefs_of(read_values(self._identified()))
         around = SimulatorAugmented(network, engine_of_beliefs(beliefs))
         return replace(model, dynamics=with_camera(around, beliefs))
-
-    def _config(self, variant: Variant) -> FitConfig:
-        config = ADDING if variant.learned == "residual" else FINE_TUNING
-        if self.scale == "quick":
-            config = replace(config, iterations=_QUICK_ITERATIONS)
-        size = min(config.batch_size, self.training.info.pushes)
-        return replace(config, batch_size=size, features=variant.features)
 
     def _identified(self) -> Path:
         """Return the folder of the engine with what the training pushes tell of it."""
