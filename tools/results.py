@@ -21,7 +21,7 @@ from typing import Any
 from sainet.engines.identified import CAMERA
 from sainet.models.registry import OF_STROKES
 from sainet.runs import manifest
-from sainet.training.config import ADDING, FitConfig
+from sainet.training.config import RESIDUAL_TUNING, FitConfig
 from sainet.viz.control_table import control_markdown
 from sainet.viz.tables import to_markdown
 
@@ -153,17 +153,20 @@ def _tuning() -> str:
         for choice in choices
     ]
     named = dict.fromkeys(k for c in choices for k in c["change"])
-    usual = ", ".join(f"{_told(name)} {getattr(ADDING, name)}" for name in named)
+    usual = ", ".join(
+        f"{_told(name)} {getattr(RESIDUAL_TUNING, name)}" for name in named
+    )
     return (
         f"`sainet {' '.join(words)}`: tuned on 200 simulated pushes, of which the ends "
         "alone are seen, and compared on 300 others; the score is the mean error over "
-        "that of physics, one training each. A table adds to every end a smooth "
-        "function of place, direction and side (1.3 mm and 4.6 degrees, root mean "
-        "squares), which only `place` can know. Ends that are trained on also scatter "
+        "that of physics, one training each. A table adds to every end a smooth random "
+        "function of place, direction and side (standard deviations of 2 mm and 7 "
+        "degrees where a disk goes as far as the pusher), which only `place` can know. "
+        "Ends that are trained on also scatter "
         "by 1.1 mm and 3 degrees, and one in twenty failed. `unidentified` has a "
         "friction of contact (0.4) that the engine does not know (0.25); of the others "
         "it knows everything, and ends lie off by smooth random functions of the angle "
-        "at which the pusher meets the disk (0.4 mm and 3.5 degrees). Defaults with "
+        "at which the pusher meets the disk (0.6 mm and 5.5 degrees). Defaults with "
         f"`engine`: {usual}.\n\n" + "\n".join(lines)
     )
 

@@ -63,7 +63,7 @@ def make(chain, recorded, monkeypatch, tmp_path):
     monkeypatch.setattr(recorded_efficiency, "PUSHES", {"quick": (3, 5)})
     monkeypatch.setattr(few_pushes, "_QUICK_ITERATIONS", 1)
     # Of one size, so that everything compiles once.
-    for name in ("FINE_TUNING", "ADDING"):
+    for name in ("FINE_TUNING", "RESIDUAL_TUNING"):
         four = replace(getattr(few_pushes, name), batch_size=4)
         monkeypatch.setattr(few_pushes, name, four)
     # It has tests of its own, and compiles for a minute.

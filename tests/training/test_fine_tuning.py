@@ -24,6 +24,7 @@ from sainet.training.best import Best
 from sainet.training.config import FINE_TUNING, FitConfig
 from sainet.training.fit import fit
 from sainet.training.statistics import loss_weights
+from sainet.training.step import trained_layers
 from sainet.training.task import Start, Task, begin
 from training.stores import end_points_alone, info_of, made_up, write
 
@@ -94,6 +95,18 @@ def test_a_network_learns_to_see_the_place(store, start, tmp_path):
     assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
     with pytest.raises(BadCheckpoint, match="give --features place, too"):
         fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
+
+
+def test_l2_draws_what_is_added_to_the_engine_to_its_first_weights(store, tmp_path):
+    drawn = replace(TUNING, validation_share=0.0, average=0, l2=1e6)
+    fit("sain", store, drawn, tmp_path / "out", start_from="engine")
+    task = Task("sain", store, drawn, PLANAR, from_engine=True)
+    first = trained_layers(begin(task)[0].network)
+    found = trained_layers(load_network(tmp_path / "out")[0])
+    # Drawn to zero, each weight would have gone the learning rate at every iteration.
+    far = drawn.iterations * drawn.learning_rate
+    for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(first), strict=True):
+        assert np.abs(one - other).max() < far / 2
 
 
 def test_a_network_that_starts_from_the_engine_goes_on_adding_to_it(store, tmp_path):

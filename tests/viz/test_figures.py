@@ -113,4 +113,4 @@ def test_unknown_models_get_colours_of_their_own():
     assert {style.variable for style in styles.values()} <= css_variables(
         dark=True
     ).keys()
-    assert len(style_of("runs/" + 40 * "x").label) <= 28
+    assert len(style_of("runs/" + 60 * "x").label) <= 40

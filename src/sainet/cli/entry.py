@@ -26,9 +26,8 @@ from sainet.errors import SainetError
 def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
     """Return the type of all commands, with the defaults that hold for these words."""
     start = _start_from(words)
-    train = (
-        subcommand("train", default=going_on(start)) if start else subcommand("train")
-    )
+    default: dict[str, Any] = {} if start is None else {"default": going_on(start)}
+    train = subcommand("train", **default)
     return (
         Annotated[Demo, subcommand("demo")]
         | Annotated[Generate, subcommand("generate")]
@@ -47,7 +46,7 @@ def _start_from(words: Sequence[str]) -> str | None:
     for word, following in zip_longest(words, words[1:], fillvalue=""):
         name, equals, value = word.partition("=")
         if name.replace("_", "-") == "--start-from":
-            return value if equals else following or "nothing"
+            return value if equals else following
     return None
 
 

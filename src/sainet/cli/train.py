@@ -11,9 +11,9 @@ from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.training.config import (
-    ADDING,
     FINE_TUNING,
     FROM_ENGINE,
+    RESIDUAL_TUNING,
     FitConfig,
     ModelKind,
 )
@@ -80,5 +80,5 @@ class Train:
 def going_on(start_from: str) -> Train:
     """Return the defaults that hold when training goes on from a network or engine."""
     needed: Any = tyro.MISSING
-    config = ADDING if start_from == FROM_ENGINE else FINE_TUNING
+    config = RESIDUAL_TUNING if start_from == FROM_ENGINE else FINE_TUNING
     return Train(model=needed, data=needed, out=needed, config=config)

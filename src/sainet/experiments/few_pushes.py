@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from sainet.experiments.config import Scale
-from sainet.training.config import ADDING, FINE_TUNING, FROM_ENGINE, FitConfig
+from sainet.training.config import FINE_TUNING, FROM_ENGINE, RESIDUAL_TUNING, FitConfig
 
 _QUICK_ITERATIONS = 20
 
@@ -22,7 +22,9 @@ def recipe(
         pushes: of which a batch has no more.
         changes: to the defaults.
     """
-    config = replace(ADDING if start_from == FROM_ENGINE else FINE_TUNING, **changes)
+    config = replace(
+        RESIDUAL_TUNING if start_from == FROM_ENGINE else FINE_TUNING, **changes
+    )
     size = min(config.batch_size, pushes)
     if scale == "quick":
         return replace(config, batch_size=size, iterations=_QUICK_ITERATIONS)

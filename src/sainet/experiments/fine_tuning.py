@@ -1,11 +1,12 @@
 """How to fine-tune on few pushes, chosen on simulated robots (see `stand_in`)."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
+from sainet.datasets.store import Store
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.few_pushes import recipe
@@ -46,10 +47,9 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         `score` is the mean over the robots.
     """
     tables, choices = [], []
+    tuners = [_tuner(robot, scale, chain) for robot in ROBOTS]
     for start, change in WAYS:
-        found = {
-            robot.name: _tune(robot, start, change, scale, chain) for robot in ROBOTS
-        }
+        found = {each.robot: each.tune(start, change) for each in tuners}
         tables += found.values()
         scores = {name: _score(table["rows"]) for name, table in found.items()}
         score = float(np.mean([*scores.values()]))
@@ -61,21 +61,36 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     return table
 
 
-def _tune(
-    robot: Robot, start: str, change: Change, scale: Scale, chain: Chain
-) -> dict[str, Any]:
-    """Tune on the recordings of a robot; returns the table of its tests."""
+@dataclass(frozen=True)
+class _Tuner:
+    """Tunes on the recordings of one robot."""
+
+    robot: str
+    training: Store
+    tests: Store
+    scale: Scale
+    chain: Chain
+
+    def tune(self, start: str, change: Change) -> dict[str, Any]:
+        """Return the table of the tests."""
+        config = recipe(start, self.scale, self.training.info.pushes, change)
+        way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
+        name = f"{self.robot}/{way}"
+        result = self.chain.train(
+            "sain", self.training, config, name=name, start_from=start
+        )
+        tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")
+        models = [load_dynamics("physics"), tuned]
+        found = self.chain.compare(models, self.tests, steps=0).to_dict()
+        for row in (*found["rows"], *found["comparisons"]):
+            row["group"] = name
+        return found
+
+
+def _tuner(robot: Robot, scale: Scale, chain: Chain) -> _Tuner:
     training = recordings(robot, "training", _TRAINING[scale], 0, chain)
     tests = recordings(robot, "tests", _TESTS[scale], 1, chain)
-    config = recipe(start, scale, training.info.pushes, change)
-    way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
-    name = f"{robot.name}/{way}"
-    result = chain.train("sain", training, config, name=name, start_from=start)
-    tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")
-    found = chain.compare([load_dynamics("physics"), tuned], tests, steps=0).to_dict()
-    for row in (*found["rows"], *found["comparisons"]):
-        row["group"] = name
-    return found
+    return _Tuner(robot.name, training, tests, scale, chain)
 
 
 def _score(rows: list[dict[str, Any]]) -> float:

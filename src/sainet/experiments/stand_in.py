@@ -67,7 +67,7 @@ def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) ->
 
     Args:
         robot: that pushes.
-        name: of the dataset; nothing scatters or fails in `tests`.
+        name: of the dataset; nothing is left to chance and none fails in `tests`.
         pushes: how many.
         seed: of the pushes and of what fails.
         chain: in whose folder they are kept.
@@ -91,7 +91,10 @@ def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) ->
         "observed": "ends",
         "unexplained": robot.unexplained,
         "unexplained_sizes": [*_UNEXPLAINED],
+        "unexplained_over": _WAVE_ANGLE,
         "table": [*_TABLE],
+        "table_over": [_WAVE_LENGTH, _WAVE_TURN],
+        "spread": _SPREAD,
         "chance": [] if is_test else [*_CHANCE],
         "failed": 0 if is_test else _FAILED,
     }
@@ -131,6 +134,7 @@ def _as_recorded(
 def _at_all_steps(
     off: Float[np.ndarray, "push 3"],
 ) -> Float[np.ndarray, "push 1 1 3"]:
+    """Return what is added to every pose of a push: its end alone is looked at."""
     return off[:, None, None].astype(np.float32)
 
 

@@ -104,8 +104,8 @@ class FitConfig:
             )
 
 
-# For what goes on from a network, or from the engine, on few recorded pushes: chosen on
-# simulated ones that stand in for them (`sainet reproduce fine-tuning`).
+# For what goes on from a network, and below for what is added to the engine, on few
+# recorded pushes: chosen on simulated robots (`sainet reproduce fine-tuning`).
 FINE_TUNING = FitConfig(
     iterations=300,
     batch_size=50,
@@ -118,6 +118,6 @@ FINE_TUNING = FitConfig(
     l2=1e-3,
     log_every=25,
 )
-ADDING = replace(
+RESIDUAL_TUNING = replace(
     FINE_TUNING, iterations=1200, halve_every=800, hold=8, weight_rotation=2.0
 )

@@ -6,6 +6,8 @@ holds until it is asked again; the motion that follows from that is exact. Netwo
 say the whole motion cannot be held: they brake and kick within a step.
 """
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -105,5 +107,6 @@ def _mean(
     return jnp.mean(blocks, axis=2)
 
 
-def _time_first(tree):  # noqa: ANN001, ANN202
+def _time_first(tree: Any) -> Any:  # noqa: ANN401
+    """Swap the axes ``[push, time]`` of every array."""
     return jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), tree)

@@ -24,7 +24,7 @@ from sainet.training.loss import LossWeights
 
 # A deviation below this, or this share of the mean, is rounding: nothing varies.
 _CONSTANT, _CONSTANT_SHARE = 1e-9, 1e-4
-_STILL = 1e-14  # a mean square (m^2, say) below this is rounding
+_STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is rounding
 
 
 @eqx.filter_jit
@@ -119,7 +119,8 @@ def _errors(batch: PushBatch) -> tuple[Array, Array]:
 def _correction(batch: PushBatch) -> Array:
     """Return the acceleration that, held, makes an error as large as s-bar's is.
 
-    By mean absolute errors, which failed recordings do not rule.
+    By mean absolute errors, which failed recordings do not rule: of x and y (m/s^2) and
+    of the angle (rad/s^2).
     """
     pose, _ = _errors(batch)
     gain = jnp.asarray(gains(batch.scene.time_step, pose.shape[1]).pose_of_change)
@@ -128,9 +129,9 @@ def _correction(batch: PushBatch) -> Array:
     return _nonzero(size / jnp.nanmean(reached, axis=(0, 1, 2)))
 
 
-def _nonzero(square: Array) -> Array:
-    """Return a mean square, or 1 where there is none: of a disk that never turns."""
-    return jnp.where(square > _STILL, square, 1.0)
+def _nonzero(size: Array) -> Array:
+    """Return a size, or 1 where there is none: of a disk that never turns, say."""
+    return jnp.where(size > _STILL, size, 1.0)
 
 
 def _known_motion(batch: PushBatch) -> Array:

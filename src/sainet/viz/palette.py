@@ -20,7 +20,7 @@ _EPISODE = {
     "--other": (OTHER, "#9aa0a6"),
     "--target": (TARGET, "#d9b40a"),
 }
-_LONGEST = 28  # characters of a label; of a longer name, a folder say, the end counts
+_LONGEST = 40  # characters of a label; of a longer name, a folder say, the end counts
 
 
 @dataclass(frozen=True)
