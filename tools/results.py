@@ -3,7 +3,8 @@
     python tools/results.py [SECTION ...]
 
 Each section is a command, its figures and the machine; none is typed by hand. Finished
-runs are not made again. Sections that are not named stay as they stand in the page.
+runs are not made again, nor those whose receipts are kept (tools/receipts.py). Sections
+that are not named stay as they stand in the page.
 Recorded pushes are looked for in ../shared/data or $SAINET_DATA.
 """
 
@@ -17,6 +18,8 @@ import time
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+from receipts import RECEIPTS, keep, restore
 
 from sainet.engines.identified import CAMERA
 from sainet.models.registry import OF_STROKES
@@ -42,11 +45,13 @@ def main() -> None:
     if unknown:
         parser.error(f"no section {sorted(unknown)[0]!r}; there are {[*SECTIONS]}")
     parts = _standing()
+    restore(RECEIPTS, ROOT / RUNS)
     for name in chosen or SECTIONS:
         title, write = SECTIONS[name]
         parts[title] = f"## {title}\n\n{write().strip()}\n"
         ordered = [parts[title] for title, _ in SECTIONS.values() if title in parts]
         PAGE.write_text("\n".join([_head(), *ordered]), "utf-8")
+        keep(ROOT / RUNS, RECEIPTS)
 
 
 def _standing() -> dict[str, str]:

@@ -1,6 +1,7 @@
 """Trials: seeded, resumable, the same goals for every model."""
 
 import json
+import runpy
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,7 @@ from sainet.control.trials import episode_file, make_trial, run_trials
 from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs import CONFIG as CONFIG_FILE
 from sainet.runs import read_json
+from support import REPOSITORY
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
 
@@ -245,3 +247,30 @@ def test_pairs_are_compared_exactly():
     assert (found["only_one"], found["only_other"]) == (6, 0)
     assert found["p"] == pytest.approx(2 * 0.5**6)
     assert paired_test(one, one)["p"] == 1.0
+
+
+def test_receipts_put_back_spare_running_again(done, tmp_path, monkeypatch):
+    tool = runpy.run_path(str(REPOSITORY / "tools" / "receipts.py"))
+    runs, receipts, elsewhere = tmp_path / "runs", tmp_path / "kept", tmp_path / "new"
+    out, records = done
+    shutil.copytree(out, runs / tool["TRIALS"] / "cell")
+    training, unfinished = (runs / "robot-paper" / name for name in ("sain", "in"))
+    for folder in (training, unfinished):
+        folder.mkdir(parents=True)
+        for name in tool["_TRAINING"]:
+            (folder / name).write_text(name)
+    (unfinished / "card.json").unlink()
+    kept = [str(path.relative_to(receipts)) for path in tool["keep"](runs, receipts)]
+    assert kept == ["robot-paper/sain", f"{tool['TRIALS']}/cell.jsonl"]
+    tool["restore"](receipts, elsewhere)
+    for name in tool["_TRAINING"]:
+        assert (elsewhere / "robot-paper" / "sain" / name).read_text() == name
+    monkeypatch.setattr(trials, "run_episode", None)  # what is there is enough
+    found = run_trials(CONFIG, elsewhere / tool["TRIALS"] / "cell")
+    exact, kept = summarise(records), summarise(found)
+    assert kept.pop("median_decision_s") == pytest.approx(
+        exact.pop("median_decision_s"), abs=1e-4
+    )
+    assert kept == exact
+    # What is there stays as it is.
+    assert tool["keep"](runs, receipts) == tool["restore"](receipts, elsewhere) == []

@@ -35,9 +35,9 @@ class ControlConfig:
     nominal ones that the assumed engine believes in."""
     tolerance: float = 0.1
     """Of the moved disk's radius, within which its goal is reached."""
-    aim: float = 1.0
+    aim: float = 0.9
     """Of the tolerance, within which the disk has to be seen before an episode ends:
-    sight is noisy, and less than 1 leaves room for that."""
+    sight is noisy, and this leaves room for four standard deviations of it."""
     alignment: float = 3.0
     """Weight (m) of the cosine distance in the heuristic."""
     deadline: float | None = None
