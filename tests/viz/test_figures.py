@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from sainet.viz.canvas import spread
-from sainet.viz.figures import draw_error_over_time, draw_learning_curve, draw_paths
+from sainet.viz.figures import draw_error_over_time, draw_paths
+from sainet.viz.learning import draw_learning_curve, running_mean
 from sainet.viz.palette import css_variables, style_of, styles_of
 from sainet.viz.replay import Replay, Track
 from viz import samples
@@ -114,3 +115,19 @@ def test_unknown_models_get_colours_of_their_own():
         dark=True
     ).keys()
     assert len(style_of("runs/" + 60 * "x").label) <= 40
+
+
+def test_a_running_mean_is_of_the_losses_around(tmp_path):
+    losses = np.random.default_rng(0).lognormal(size=60)
+    assert running_mean(losses)[30] == pytest.approx(losses[27:33].mean())
+    assert running_mean(losses[:5]).tolist() == losses[:5].tolist()  # too few
+
+
+def test_a_learning_curve_explains_what_it_shows_alone(tmp_path):
+    whole = samples.histories()
+    nothing = np.array([])
+    alone = {name: (*parts[:2], nothing, nothing) for name, parts in whole.items()}
+    empty = {"in": (nothing,) * 4}
+    for histories, told in ((whole, True), (alone, False), (empty, False)):
+        path = draw_learning_curve(histories, tmp_path / "a.svg")
+        assert (">validation<" in path.read_text()) is told

@@ -7,7 +7,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from sainet.viz.figures import draw_learning_curve, draw_paths
+from sainet.viz.figures import draw_paths
+from sainet.viz.learning import draw_learning_curve
 from sainet.viz.report import Report, replay_data, to_page, write_report
 from viz import samples
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from sainet.training.fit import FitResult
-from sainet.viz.figures import draw_learning_curve
+from sainet.viz.learning import draw_learning_curve
 
 
 def draw_history(result: FitResult, path: Path) -> Path:

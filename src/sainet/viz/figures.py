@@ -1,4 +1,4 @@
-"""The figures: paths of a push, errors over time, learning curves.
+"""The figures: paths of a push, errors over time.
 
 Each function draws with matplotlib's objects alone (no window, no global state but
 the style during the call), writes SVG or PNG by the suffix, whole or not at all, and
@@ -10,9 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from sainet.viz.canvas import (
     add_grid,
@@ -22,12 +19,11 @@ from sainet.viz.canvas import (
     new_figure,
     save,
 )
-from sainet.viz.palette import INK, ModelStyle, styles_of
+from sainet.viz.palette import ModelStyle, styles_of
 from sainet.viz.panels import draw_lens, draw_scene, push_panels
 from sainet.viz.replay import Replay
 
 Curve = Float[np.ndarray, "time body"]  # mm
-History = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def draw_paths(replay: Replay, path: Path) -> Path:
@@ -85,40 +81,6 @@ def draw_error_over_time(
         return save(figure, path)
 
 
-def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
-    """Draw training loss (thin) and validation loss (dotted line) over iterations.
-
-    Args:
-        histories: by model, iterations and training loss, iterations and validation
-            loss (both may be empty); losses have no unit.
-        path: where to write; ``.svg`` or ``.png``.
-    """
-    styles = styles_of(histories)
-    with house_look():
-        figure = new_figure(6.4, 3.4)
-        axes = figure.subplots()
-        axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        for name, history in histories.items():
-            _draw_history(axes, styles[name], history)
-        axes.set(xlabel="iteration", ylabel="loss", title="Learning")
-        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
-        axes.margins(x=0.02)
-        add_grid(axes)
-        _explain_lines(axes)
-        figure.draw_without_rendering()
-        ends = {name: _end(history) for name, history in histories.items()}
-        known = [name for name, end in ends.items() if end is not None]
-        label_ends(
-            axes,
-            [styles[name] for name in known],
-            [end for end in ends.values() if end is not None],
-        )
-        return save(figure, path)
-
-
 def _label_panels(
     panels: np.ndarray,
     curves: Mapping[str, Curve],
@@ -128,25 +90,3 @@ def _label_panels(
     for body, axes in enumerate(panels):
         ends = [(time_step * len(curve), curve[-1, body]) for curve in curves.values()]
         label_ends(axes, list(styles.values()), ends)
-
-
-def _draw_history(axes: Axes, style: ModelStyle, history: History) -> None:
-    iterations, training, checked, validation = map(np.asarray, history)
-    axes.plot(iterations, training, color=style.color, linewidth=0.7, alpha=0.55)
-    axes.plot(checked, validation, color=style.color, marker="o", markersize=3)
-
-
-def _explain_lines(axes: Axes) -> None:
-    thin = Line2D([], [], color=INK, linewidth=0.7, alpha=0.7, label="training")
-    thick = Line2D([], [], color=INK, marker="o", markersize=3, label="validation")
-    axes.legend(handles=[thin, thick], loc="upper right")
-
-
-def _end(history: History) -> tuple[float, float] | None:
-    """Return the last point of the validation loss, else of the training loss."""
-    iterations, training, checked, validation = map(np.asarray, history)
-    if len(validation):
-        return float(checked[-1]), float(validation[-1])
-    if len(training):
-        return float(iterations[-1]), float(training[-1])
-    return None
