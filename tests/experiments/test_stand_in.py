@@ -68,13 +68,19 @@ def test_what_is_unexplained_has_the_stated_size_over_many_robots():
     assert np.abs(np.mean(many, axis=(0, 1)) / size).max() < 0.1
 
 
-def test_pushes_are_placed_as_a_whole():
-    arrays = strokes(np.array([-1.0, 0.3, 0.8]))
+def whole_strokes(angles):
+    """The same with everything that a store knows of them."""
+    arrays = strokes(angles)
     arrays["measured"] = arrays["truth"][..., :3]
     arrays["truth_pusher"] = arrays["command_position"]
     arrays["command_velocity"] = np.gradient(arrays["command_position"], axis=1)
     arrays["truth"][..., 3:] = arrays["initial"][:, None, :, 3:] = [0.1, 0.2, 0.3]
-    arrays["steps"] = np.full(3, 3)
+    arrays["steps"] = np.full(len(angles), 3)
+    return arrays
+
+
+def test_pushes_are_placed_as_a_whole():
+    arrays = whole_strokes(np.array([-1.0, 0.3, 0.8]))
     there = placed(arrays, 0)
     # What one sees from the pusher, whichever way one looks, stays as it was.
     for name in ("initial", "truth", "measured"):
@@ -115,6 +121,22 @@ def test_the_table_knows_place_and_direction():
     arrays["initial"][:, 0, 2] = 0
     assert np.ptp(of_the_table(arrays), axis=0) == pytest.approx([0, 0, 0])
     assert not np.allclose(of_the_table(turned(arrays, 1.0))[:, 2], by_side[0, 2])
+
+
+def test_what_the_table_does_is_nothing_on_average():
+    arrays = whole_strokes(np.zeros(20_000))
+    arrays["initial"][:, 0, :2] = 0  # as a store has them
+    there = placed(arrays, 0)
+    off = of_the_table(there)
+    along = there["command_velocity"][:, 1]
+    along /= np.linalg.norm(along, axis=-1, keepdims=True)
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
+    seen = np.stack(
+        [np.sum(off[:, :2] * along, -1), np.sum(off[:, :2] * across, -1), off[:, 2]], -1
+    )
+    # The means of so many lie within some hundredths of the deviation.
+    assert (np.abs(seen.mean(axis=0)) < 0.04 * seen.std(axis=0)).all()
+    assert (seen.std(axis=0) > [5e-4, 5e-4, np.deg2rad(2)]).all()
 
 
 def test_robots_are_not_alike():
