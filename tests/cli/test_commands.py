@@ -61,6 +61,7 @@ def test_bad_settings_are_named_and_nothing_is_made(tmp_path, words, names):
         (("import", "mitpush-endpoints", "no.csv", "--out", "x"), ("no.csv",)),
         (("reproduce", "no-such-table"), ("no-such-table", "robot-planar")),
         (("bench", "no-such-case"), ("no-such-case", "training")),
+        (("report", "no-such-folder"), ("no-such-folder", "sainet made")),
     ],
 )
 def test_what_is_missing_is_named(tmp_path, monkeypatch, words, names):
@@ -148,6 +149,9 @@ def test_control(tmp_path):
         assert (out / name).stat().st_size > 0
     command = "sainet control --model physics --goals hard --trials 2 --pushes 1"
     assert f"{command} --animate" in (out / "replay.html").read_text()
+    done = sainet("report", out, "--json")
+    assert json.loads(done.stdout) == {"report": str(out / "report.html")}
+    assert "Pushing to a goal" in (out / "report.html").read_text()
     error = sainet("control", "--model", "no", "--out", tmp_path / "x", status=2).stderr
     assert error.startswith("sainet: No model named 'no'")
     assert not (tmp_path / "x").exists()

@@ -151,5 +151,7 @@ def record(pushes=3, **changes):
         "tolerance_mm": 5.9,
         "radius_mm": [54.0, 59.0],
         "pusher_radius_mm": 4.8,
+        "table_friction": 0.15,
+        "decision_s": [0.1] * pushes,
     }
     return known | changes

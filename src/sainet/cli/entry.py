@@ -18,6 +18,7 @@ from sainet.cli.generate import Generate
 from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
 from sainet.cli.output import finish
+from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.train import Train, going_on
 from sainet.errors import SainetError
@@ -37,6 +38,7 @@ def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
         | Annotated[Identify, subcommand("identify")]
         | Annotated[Control, subcommand("control")]
         | Annotated[Reproduce, subcommand("reproduce")]
+        | Annotated[MakeReport, subcommand("report")]
         | Annotated[Bench, subcommand("bench")]
     )
 

@@ -21,9 +21,7 @@ from sainet.training.config import FitConfig
 from sainet.viz.episode_frames import outcome
 from sainet.viz.figures import draw_error_over_time, draw_paths
 from sainet.viz.replay import Replay
-from sainet.viz.report import Report, write_report
-
-REPORT = "report.html"
+from sainet.viz.report import REPORT, Report, write_report
 
 _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with assumed \
 masses, radii and friction predicts such contacts badly (Physics); a network alone \

@@ -1,4 +1,4 @@
-"""The table of control trials, for a terminal and for Markdown."""
+"""The table of control trials, for a terminal, for Markdown and for a page."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,6 +10,7 @@ from rich.text import Text
 
 from sainet.viz.palette import styles_of
 from sainet.viz.rows import DASH
+from sainet.viz.templates import render
 
 HEADINGS = (
     *("trials", "model", "solved", "success (95 %)", "pushes (median)"),
@@ -47,6 +48,19 @@ def control_markdown(result: Mapping[str, Any]) -> str:
     rows = [list(HEADINGS), rule, *_ours(result), *slanted]
     lines = ["| " + " | ".join(row) + " |" for row in rows]
     return "\n".join([*lines, "", *(f"- {s}" for s in sentences(result)), ""])
+
+
+def control_html(result: Mapping[str, Any]) -> str:
+    """Return the table of control trials as HTML in which every string is escaped."""
+    styles = styles_of(str(row["model"]) for row in result["rows"])
+    return render(
+        "control.html.j2",
+        headings=HEADINGS,
+        ours=_ours(result),
+        variables=[styles[str(row["model"])].variable for row in result["rows"]],
+        theirs=_theirs(result),
+        sentences=sentences(result),
+    )
 
 
 def sentences(result: Mapping[str, Any]) -> list[str]:

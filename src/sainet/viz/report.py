@@ -11,15 +11,17 @@ import numpy as np
 from markupsafe import Markup
 
 from sainet.runs import write_bytes
+from sainet.viz.control_table import control_html, is_control
 from sainet.viz.episode_frames import episode_data
 from sainet.viz.palette import css_variables, styles_of
 from sainet.viz.replay import Replay, Track
+from sainet.viz.svg import inline_svg, read_svg
 from sainet.viz.tables import to_html
 from sainet.viz.templates import read, render
 
+REPORT = "report.html"
 _SCRIPTS = ("motion.js", "draw.js", "transport.js", "replay.js", "episode.js")
 _DECIMALS_MM = 3
-_PIXELS_PER_POINT = 1.4
 _DECIMALS_RAD = 5
 
 
@@ -30,7 +32,8 @@ class Report:
     title: str
     subtitle: str = ""
     summary: str = ""  # plain text, paragraphs parted by empty lines
-    table: Mapping[str, Any] | None = None  # the result of `sainet evaluate --json`
+    # The result of `sainet evaluate --json`, or the table of an experiment.
+    table: Mapping[str, Any] | None = None
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
     replays: Sequence[Replay] = ()
@@ -53,7 +56,8 @@ def to_page(report: Report) -> str:
         paragraphs=[text for text in re.split(r"\n\s*\n", report.summary) if text],
         replays=[replay_data(replay) for replay in report.replays],
         episodes=[episode_data(record) for record in report.episodes],
-        table=Markup(to_html(report.table)) if report.table else "",
+        table=Markup(_table(report.table)) if report.table else "",
+        is_control=bool(report.table) and is_control(report.table),
         figures=list(_pictures(report.figures)),
         manifest=list(_flatten(report.manifest)),
         light=css_variables(dark=False),
@@ -61,6 +65,10 @@ def to_page(report: Report) -> str:
         css=Markup(read("report.css")),
         script=Markup('"use strict";\n' + "\n".join(map(read, _SCRIPTS))),
     )
+
+
+def _table(table: Mapping[str, Any]) -> str:
+    return control_html(table) if is_control(table) else to_html(table)
 
 
 def replay_data(replay: Replay) -> dict[str, Any]:
@@ -111,36 +119,13 @@ def _pictures(
 ) -> Iterator[dict[str, str]]:
     for number, (source, caption) in enumerate(figures, start=1):
         if isinstance(source, str):
-            picture = _inline_svg(source, number)
+            picture = inline_svg(source, number)
         elif source.suffix.lower() == ".svg":
-            picture = _inline_svg(source.read_text("utf-8"), number)
+            picture = inline_svg(read_svg(source), number)
         else:
             data = base64.b64encode(source.read_bytes()).decode()
             picture = Markup('<img alt="" src="data:image/png;base64,{}">').format(data)
         yield {"picture": picture, "caption": caption}
-
-
-def _inline_svg(text: str, number: int) -> Markup:
-    """Return an SVG fit to stand inside the page.
-
-    Its identifiers get a prefix, so that two figures do not mix them up, and the
-    colours of the palette become variables, which follow the theme of the page.
-    """
-    svg = text[text.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
-    svg = re.sub(r'\bid="', f'id="figure-{number}-', svg)
-    svg = re.sub(r'(href="#|url\(#)', rf"\1figure-{number}-", svg)
-    svg = re.sub(r'^<svg([^>]*?) width="([\d.]+)pt"', _at_reading_size, svg)
-    variables = css_variables(dark=False)
-    for name, color in sorted(variables.items(), reverse=True):
-        svg = svg.replace(color, f"var({name})")
-    return Markup(svg)
-
-
-def _at_reading_size(opening: re.Match[str]) -> str:
-    """Limit the width, so that the text of all figures has the same size."""
-    width = float(opening[2]) * _PIXELS_PER_POINT
-    return f'<svg style="max-width: {width:.0f}px"{opening[1]} width="{opening[2]}pt"'
 
 
 def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

@@ -1,0 +1,30 @@
+"""`sainet report`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tyro.conf import Positional
+
+from sainet.cli.output import Output
+
+
+@dataclass(frozen=True, kw_only=True)
+class MakeReport:
+    """Write report.html into a run folder: one page that needs nothing else."""
+
+    folder: Positional[Path]
+    """What train, control, identify, demo or one experiment of reproduce made."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Write the report, unless the command that made the folder wrote its own."""
+        from sainet.experiments.run_report import is_of_demo, page_of
+        from sainet.runs import write_bytes
+        from sainet.viz.report import REPORT
+
+        path = self.folder / REPORT
+        if not is_of_demo(self.folder):
+            write_bytes(path, page_of(self.folder).encode())
+        self.output.say(f"Open {path} in a browser.")
+        return {"report": str(path)}
