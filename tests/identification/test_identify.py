@@ -27,6 +27,7 @@ from sainet.identification.parameters import (
 from sainet.identification.residuals import Scale, residuals, samples, slopes
 from sainet.models.registry import load_dynamics
 from sainet.pushes import move_controls, move_pusher
+from sainet.training.assumed import find_assumed_engine
 from training.stores import end_points_alone, info_of, made_up, write
 
 OFFSET = {"camera_x_mm": 0.8, "camera_y_mm": -0.5}
@@ -121,8 +122,9 @@ def test_slopes_are_those_of_finite_differences(store):
 
 
 def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
-    out = tmp_path / "mine"
-    result = identify_into(store, out)
+    out, tried = tmp_path / "mine", []
+    result = identify_into(store, out, on_try=tried.append)
+    assert tried[-1] < tried[0]
     assert json.loads((out / FILE).read_text()) == result
     model = load_dynamics(str(out))
     assert model.name == "mine"
@@ -139,6 +141,10 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
     assert (out / FILE).stat().st_mtime_ns == before
     with pytest.raises(RunConflict, match="data is"):
         identify_into(store.first(5), out)
+    (out / FILE).unlink()  # as if it had been interrupted
+    for use in (load_dynamics, find_assumed_engine):
+        with pytest.raises(BadInput, match=f"{FILE}: missing, so .* 'sainet identify'"):
+            use(str(out))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from typing import Any
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
+from sainet.cli.progress import progress_bar
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,8 +30,11 @@ class Identify:
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
-        self.output.say(f"Fitting to {store.info.pushes} pushes, a minute or so.")
-        found = identify_into(store, self.out)
+        title = f"Fitting to {store.info.pushes} pushes, a minute or so"
+        with progress_bar(title, None, self.output) as advance:
+            found = identify_into(
+                store, self.out, on_try=lambda error: advance(1, f"error {error:.3f}")
+            )
         print_estimates(found, self.output.console)
         self.output.say(
             f"Compare: sainet evaluate --model physics-calibrated {self.out} "

@@ -9,12 +9,12 @@ Advance = Callable[[int, str], None]  # by how much, and a note
 
 
 @contextmanager
-def progress_bar(title: str, total: int, output: Output) -> Iterator[Advance]:
+def progress_bar(title: str, total: int | None, output: Output) -> Iterator[Advance]:
     """Show a bar while something goes on; what is given advances it.
 
     Args:
         title: what is going on.
-        total: how much there is to do.
+        total: how much there is to do; None where nobody knows.
         output: `quiet` shows nothing.
     """
     from rich.console import Console

@@ -7,7 +7,7 @@ from typing import Any
 from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput
-from sainet.runs import is_number, read_json
+from sainet.runs import CONFIG, is_number, read_json
 
 FILE = "identified.json"
 IDENTIFIED = "identified"  # the name of such an engine on a network's card
@@ -54,17 +54,25 @@ def camera_offset(beliefs: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def is_identified(folder: Path) -> bool:
-    """Return whether `sainet identify` left an engine in a folder."""
-    return (folder / FILE).is_file()
+    """Return whether `sainet identify` made a folder, if only begun."""
+    if (folder / FILE).is_file():
+        return True
+    settings = folder / CONFIG
+    return settings.is_file() and read_json(settings).get("command") == "identify"
 
 
 def read_values(folder: Path) -> dict[str, float]:
     """Return the values that `sainet identify` left in a folder, by their names.
 
     Raises:
-        BadInput: the file is damaged or holds no such values.
+        BadInput: the file is missing, damaged or holds no such values.
     """
     path = folder / FILE
+    if not path.is_file():
+        raise BadInput(
+            f"{path}: missing, so the identification is unfinished; run the same "
+            "'sainet identify' again."
+        )
     values = read_json(path).get("values")
     if not isinstance(values, dict) or not values:
         raise BadInput(f"{path}: values is missing; run 'sainet identify' again.")

@@ -25,7 +25,7 @@ from sainet.identification.residuals import (
     pose_errors,
     samples,
 )
-from sainet.identification.solve import solve
+from sainet.identification.solve import Try, solve
 from sainet.runs import open_run, read_json, write_json
 
 
@@ -46,8 +46,15 @@ class Identified:
         return {"values": values, **asdict(self)}
 
 
-def identify_into(store: Store, out: Path) -> dict[str, Any]:
+def identify_into(
+    store: Store, out: Path, *, on_try: Try = lambda error: None
+) -> dict[str, Any]:
     """Identify an engine's parameters into a run folder; again is no work.
+
+    Args:
+        store: see `identify`.
+        out: the run folder.
+        on_try: see `identify`.
 
     Returns:
         What `Identified.to_dict` says, as it is kept in `identified.json`.
@@ -60,7 +67,7 @@ def identify_into(store: Store, out: Path) -> dict[str, Any]:
     check_store(store)
     folder = open_run(out, settings, finished_by=FILE)
     if not folder.is_finished:
-        write_json(out / FILE, identify(store).to_dict())
+        write_json(out / FILE, identify(store, on_try=on_try).to_dict())
     return read_json(out / FILE)
 
 
@@ -79,7 +86,7 @@ def check_store(store: Store) -> None:
             )
 
 
-def identify(store: Store) -> Identified:
+def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
     """Fit frictions, pressure distribution and where the camera sees the disks.
 
     Nonlinear least squares (SciPy, robust against outliers) on position and rotation at
@@ -89,6 +96,8 @@ def identify(store: Store) -> Identified:
 
     Args:
         store: of pushes along paths, observed at their ends at least.
+        on_try: told the error of all values that are tried, root mean square; at the
+            start it is about 1.
 
     Raises:
         BadStore: nothing of its pushes was observed, or forces drive them.
@@ -103,7 +112,7 @@ def identify(store: Store) -> Identified:
     values, known, doubtful = start, {}, {}
     while len(doubtful) < len(start):
         free = [name for name in start if name not in doubtful]
-        values = solve(start, free, scale, parts)
+        values = solve(start, free, scale, parts, on_try=on_try)
         known = intervals(values, free, scale, parts)
         doubts = {name: doubt(name, values[name], *known[name]) for name in free}
         new = {name: (why, known[name]) for name, why in doubts.items() if why}

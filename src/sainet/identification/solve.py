@@ -1,6 +1,6 @@
 """Nonlinear least squares over the parameters that are free."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -12,6 +12,8 @@ from sainet.identification.parameters import (
 )
 from sainet.identification.residuals import Sample, Scale, residuals, slopes
 
+Try = Callable[[float], None]  # told the error of all, root mean square
+
 _INSIDE = 1e-3  # of a bound, where a search begins
 
 
@@ -20,6 +22,8 @@ def solve(
     free: Sequence[str],
     scale: Scale,
     parts: Sequence[Sample],
+    *,
+    on_try: Try,
 ) -> dict[str, float]:
     """Return the best values of the free parameters, the others as they were."""
     bounds = bounds_of(free)
@@ -30,7 +34,9 @@ def solve(
 
     def residual(vector: np.ndarray) -> np.ndarray:
         found = [residuals(at(vector), scale, part).ravel() for part in parts]
-        return np.concatenate(found)
+        whole = np.concatenate(found)
+        on_try(float(np.sqrt(np.mean(whole**2))))
+        return whole
 
     def slope(vector: np.ndarray) -> np.ndarray:
         found = [slopes(at(vector), free, scale, part) for part in parts]
