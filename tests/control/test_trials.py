@@ -18,7 +18,7 @@ from sainet.control.summary import paired_test, summarise
 from sainet.control.trials import episode_file, make_trial, run_trials
 from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs import CONFIG as CONFIG_FILE
-from sainet.runs import read_json
+from sainet.runs import read_json, write_json
 from support import REPOSITORY
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
@@ -89,6 +89,17 @@ def test_a_network_trained_again_is_another_model(tmp_path):
     run_trials(config, out)
     write_network(net, seed=1)
     trials.prepare.cache_clear()
+    with pytest.raises(RunConflict, match="weights is"):
+        run_trials(config, out)
+
+
+def test_an_engine_identified_again_is_another_model(tmp_path, monkeypatch):
+    monkeypatch.setattr(trials, "run_episode", lambda *args, **settings: None)
+    mine, out = tmp_path / "mine", tmp_path / "out"
+    config = replace(CONFIG, model=str(mine), trials=1)
+    write_json(mine / "identified.json", {"values": {"pusher_friction": 0.2}})
+    run_trials(config, out)
+    write_json(mine / "identified.json", {"values": {"pusher_friction": 0.3}})
     with pytest.raises(RunConflict, match="weights is"):
         run_trials(config, out)
 

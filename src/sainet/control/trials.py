@@ -17,13 +17,14 @@ from sainet.control.record import read_record, record
 from sainet.engines import make_engine
 from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
 from sainet.engines.config import NoiseConfig, at_level
+from sainet.engines.identified import FILE
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import load_dynamics
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.processes import each_done
 from sainet.robots.simulated import SimulatedRobot
-from sainet.runs import open_run, write_json
+from sainet.runs import content_hash, open_run, write_json
 from sainet.scene import TIME_STEP, Scene, State, at_rest
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
@@ -70,9 +71,7 @@ def run_trials(
         BadInput: the model cannot be used for such pushes, or an episode is damaged.
     """
     model, _ = prepare(config)  # what is wrong is said before anything is made
-    # A network that was trained again in the same folder is another model.
-    weights = model.card.weights if model.card else None
-    settings = {"command": "control", "weights": weights, **asdict(config)}
+    settings = {"command": "control", "weights": _weights(model), **asdict(config)}
     for name, before in _LATER.items():
         if settings[name] == before:
             del settings[name]
@@ -87,6 +86,16 @@ def run_trials(
     records = [read_record(path) for path in files]
     write_json(out / SUMMARY, {"episodes": [str(p.relative_to(out)) for p in files]})
     return records
+
+
+def _weights(model: NamedDynamics) -> str | None:
+    """Return the hash of what was trained or identified, if anything was.
+
+    What was made again in the same folder is another model.
+    """
+    if model.card is None and model.folder is not None:
+        return content_hash((model.folder / FILE).read_bytes())
+    return model.card.weights if model.card else None
 
 
 def episode_file(out: Path, trial: int) -> Path:

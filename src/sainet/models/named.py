@@ -17,7 +17,7 @@ class NamedDynamics:
     name: str
     dynamics: AbstractDynamics
     card: Card | None = None
-    folder: Path | None = None
+    folder: Path | None = None  # of what was trained or identified
 
     def check_fits(self, kind: str, time_step: float, seed: int | None = None) -> None:
         """Raise `BadCheckpoint` if the network is not for these pushes.

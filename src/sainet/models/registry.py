@@ -60,7 +60,7 @@ def load_dynamics(
     folder = network_folder(name)
     if is_identified(folder):
         _check_identified(folder, engine)
-        return NamedDynamics(folder.name, _identified_physics(folder))
+        return NamedDynamics(folder.name, _identified_physics(folder), folder=folder)
     network, card = load_network(folder)
     if engine is not None and not force:
         _check_engine(folder, card, engine)
