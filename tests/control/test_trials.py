@@ -263,7 +263,8 @@ def test_pairs_are_compared_exactly():
 def test_receipts_put_back_spare_running_again(done, tmp_path, monkeypatch):
     tool = runpy.run_path(str(REPOSITORY / "tools" / "receipts.py"))
     runs, receipts, elsewhere = tmp_path / "runs", tmp_path / "kept", tmp_path / "new"
-    out, records = done
+    out = done[0]
+    records = [read_json(episode_file(out, index)) for index in range(CONFIG.trials)]
     shutil.copytree(out, runs / tool["TRIALS"] / "cell")
     training, unfinished = (runs / "robot-paper" / name for name in ("sain", "in"))
     for folder in (training, unfinished):
