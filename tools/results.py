@@ -400,7 +400,7 @@ SECTIONS = {
             _table,
             "data-efficiency",
             "IN and SAIN on the robot setup, Bullet as the truth; three trainings "
-            "each, of 10,000 iterations however few the pushes are.",
+            "each, of 10,000 iterations on all pushes and 2,500 on fewer.",
             figure="data-efficiency",
         ),
     ),
