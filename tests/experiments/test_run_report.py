@@ -69,6 +69,18 @@ def test_what_was_identified_is_said(tmp_path):
     assert "Mean errors of 12 pushes: position 2.00 mm before" in page
 
 
+def test_what_hides_beside_a_figure_is_left_out(tmp_path):
+    hidden = "<!-- <svg onload='alert(1)'> -->"
+    doctype = "<!DOCTYPE svg [<!ENTITY a \"<svg onload='alert(2)'>\">]>"
+    drawn = draw_paths(samples.replay(), tmp_path / "paths.svg")
+    body = drawn.read_text()
+    body = body[body.index("<svg") :]
+    drawn.write_text(f"{doctype}{hidden}{body}")
+    page = page_of(tmp_path)
+    assert "alert" not in page
+    assert page.count("<svg") == 1
+
+
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [

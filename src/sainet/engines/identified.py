@@ -57,8 +57,10 @@ def is_identified(folder: Path) -> bool:
     """Return whether `sainet identify` made a folder, if only begun."""
     if (folder / FILE).is_file():
         return True
-    settings = folder / CONFIG
-    return settings.is_file() and read_json(settings).get("command") == "identify"
+    try:
+        return read_json(folder / CONFIG).get("command") == "identify"
+    except BadInput:  # missing or damaged: what is there will tell what it is
+        return False
 
 
 def read_values(folder: Path) -> dict[str, float]:

@@ -12,30 +12,37 @@ from sainet.viz.palette import css_variables
 _PIXELS_PER_POINT = 1.4
 # What a figure of this package is made of.
 _SHAPES = ("svg", "defs", "style", "g", "path", "use", "text", "clipPath", "rect")
-_ABOUT = ("metadata", "RDF", "Work", "format", "type")
+_NAMESPACES = {
+    "": "http://www.w3.org/2000/svg",
+    "xlink": "http://www.w3.org/1999/xlink",
+}
 
 
 def read_svg(path: Path) -> str:
     """Read a figure that this package drew.
 
+    What is returned is written anew from what was checked: comments and declarations,
+    in which more could hide, are gone.
+
     Raises:
         BadInput: it is none: it might do something in the page.
     """
     try:
-        text = path.read_text("utf-8")
-        parts = [*ElementTree.fromstring(text).iter()]
+        figure = ElementTree.fromstring(path.read_text("utf-8"))
     except (OSError, ValueError, ElementTree.ParseError) as error:
         raise BadInput(f"{path}: cannot be read as a figure ({error}).") from None
-    for part in parts:
+    for about in figure.findall(f"{{{_NAMESPACES['']}}}metadata"):
+        figure.remove(about)
+    for part in figure.iter():
         name = part.tag.rpartition("}")[2]
-        if name not in (*_SHAPES, *_ABOUT) or not all(
-            map(_is_plain, part.attrib.items())
-        ):
+        if name not in _SHAPES or not all(map(_is_plain, part.attrib.items())):
             raise BadInput(
                 f"{path}: <{name}> is nothing that sainet draws; delete the file or "
                 "take it out of the folder."
             )
-    return text
+    for prefix, name in _NAMESPACES.items():
+        ElementTree.register_namespace(prefix, name)
+    return ElementTree.tostring(figure, "unicode")
 
 
 def _is_plain(attribute: tuple[str, str]) -> bool:
