@@ -148,21 +148,25 @@ def _tuning() -> str:
     choices = _run(*words)["choices"]
     robots = list(choices[0]["scores"])
     lines = [
-        f"| way | {' | '.join(robots)} | mean |",
-        "| :-- |" + " --: |" * (len(robots) + 1),
+        f"| pushes | way | {' | '.join(robots)} | mean |",
+        "| --: | :-- |" + " --: |" * (len(robots) + 1),
     ]
     lines += [
-        f"| from `{choice['start']}`, {_changed(choice['change'])} | "
+        f"| {choice['pushes']} | from `{choice['start']}`, "
+        f"{_changed(choice['change'])} | "
         + " | ".join(f"{choice['scores'][robot]:.3f}" for robot in robots)
         + f" | {choice['score']:.3f} |"
         for choice in choices
     ]
     named = dict.fromkeys(k for c in choices for k in c["change"])
     usual = ", ".join(
-        f"{_told(name)} {getattr(RESIDUAL_TUNING, name)}" for name in named
+        "l2 1 / pushes"
+        if name == "l2"
+        else f"{_told(name)} {getattr(RESIDUAL_TUNING, name)}"
+        for name in named
     )
     return (
-        f"`sainet {' '.join(words)}`: tuned on 200 simulated pushes, of which the ends "
+        f"`sainet {' '.join(words)}`: tuned on simulated pushes, of which the ends "
         "alone are seen, and compared on 300 others; the score is the mean error over "
         "that of physics, one training each. A table adds to every end a smooth random "
         "function of place, direction and side (standard deviations of 1.2 mm and 5 "

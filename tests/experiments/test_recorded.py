@@ -126,31 +126,40 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
 
 
 @pytest.mark.slow
-def test_ways_to_tune_are_compared_over_robots(make, monkeypatch):
+def test_ways_to_tune_are_compared_over_robots(make, monkeypatch, tmp_path):
     one = {"learning_rate": 1e-3, "mirror": False}
     robots = (Robot("a", believed_friction=0.25), Robot("b", unexplained=0))
     monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
     monkeypatch.setattr(fine_tuning, "WAYS", (("engine", one),))
+    monkeypatch.setattr(fine_tuning, "WAYS_WITH_FEW", (("engine", {}),))
     monkeypatch.setattr(fine_tuning, "_TESTS", {"quick": 4})
     table = make("fine-tuning")
-    rows = {(row["group"][0], row["model"]): row for row in table["rows"]}
-    assert rows.keys() == set(product("ab", ("physics", "sain-tuned")))
-    scores = {
-        robot: np.mean(
-            [
-                rows[robot, "sain-tuned"][key] / rows[robot, "physics"][key]
-                for key in ("final_pos_mm", "final_rot_deg")
-            ]
-        )
-        for robot in "ab"
+    rows = {(*row["group"].split("/")[:2], row["model"]): row for row in table["rows"]}
+    many, few = "20-pushes", "10-pushes"
+    assert rows.keys() == set(product("ab", (many, few), ("physics", "sain-tuned")))
+    assert [(c["pushes"], c["change"]) for c in table["choices"]] == [
+        (20, one),
+        (10, {}),
+    ]
+    for choice, pushes in zip(table["choices"], (many, few), strict=True):
+        scores = {
+            robot: np.mean(
+                [
+                    rows[robot, pushes, "sain-tuned"][key]
+                    / rows[robot, pushes, "physics"][key]
+                    for key in ("final_pos_mm", "final_rot_deg")
+                ]
+            )
+            for robot in "ab"
+        }
+        assert choice["start"] == "engine"
+        assert choice["score"] == pytest.approx(np.mean([*scores.values()]))
+        assert choice["scores"] == pytest.approx(scores)
+    decided = {
+        path.parent.parent.name: read_card(path.parent).config["l2"]
+        for path in (tmp_path / "fine-tuning").rglob("engine/card.json")
     }
-    (choice,) = table["choices"]
-    assert choice == {
-        "start": "engine",
-        "change": one,
-        "score": pytest.approx(np.mean([*scores.values()])),
-        "scores": pytest.approx(scores),
-    }
+    assert decided == {few: 0.1}  # one over the pushes
 
 
 @pytest.mark.slow

@@ -149,6 +149,14 @@ def test_l2_pulls_back_to_where_training_began():
     assert_same_tree(found, wanted, 1e-4)
 
 
+def test_without_an_l2_of_its_own_the_number_of_pushes_decides():
+    config = FitConfig(l2=None)
+    assert config.for_pushes(25).l2 == 0.04
+    assert FitConfig(l2=0.0).for_pushes(25).l2 == 0
+    with pytest.raises(ValueError, match="l2 is None"):
+        make_step(config, WEIGHTS)
+
+
 def adam_states(optimizer):
     is_adam = lambda x: isinstance(x, optax.ScaleByAdamState)  # noqa: E731
     return [x for x in jax.tree.leaves(optimizer, is_leaf=is_adam) if is_adam(x)]

@@ -26,6 +26,7 @@ CHANGES: tuple[Change, ...] = (
     {"learning_rate": 3e-3},
     {"iterations": 300, "halve_every": 200},
     {"l2": 1e-4},
+    {"l2": 1e-3},
     {"l2": 1e-2},
     {"linear_from": 0.0},
     {"weight_rotation": 1.0},
@@ -35,27 +36,39 @@ CHANGES: tuple[Change, ...] = (
     {"validation_share": 0.2, "patience": 250},
 )
 WAYS = (("sain-stroke", {}), *product([FROM_ENGINE], CHANGES))
+# With few pushes what matters is how far the network may leave the engine.
+WAYS_WITH_FEW = tuple(
+    product([FROM_ENGINE], ({}, {"l2": 1e-3}, {"l2": 1e-2}, {"l2": 0.1}))
+)
 _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
+_FEW = {"quick": 10, "paper": 25}
 
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Tune in every way that is considered, for every robot; returns the table.
 
     Returns:
-        The rows of each robot and way, and in `choices` the `scores` of each way:
-        position and rotation errors over those of physics, their mean, by robot.
-        `score` is the mean over the robots.
+        The rows of each robot, number of pushes and way, and in `choices` the `scores`
+        of each way: position and rotation errors over those of physics, their mean, by
+        robot. `score` is the mean over the robots.
     """
     tables, choices = [], []
     tuners = [_tuner(robot, scale, chain) for robot in ROBOTS]
-    for start, change in WAYS:
-        found = {each.robot: each.tune(start, change) for each in tuners}
-        tables += found.values()
-        scores = {name: _score(table["rows"]) for name, table in found.items()}
-        score = float(np.mean([*scores.values()]))
-        choices.append(
-            {"start": start, "change": change, "score": score, "scores": scores}
-        )
+    with_few = [each.with_few() for each in tuners]
+    for several, ways in ((tuners, WAYS), (with_few, WAYS_WITH_FEW)):
+        for start, change in ways:
+            found = {each.robot: each.tune(start, change) for each in several}
+            tables += found.values()
+            scores = {name: _score(table["rows"]) for name, table in found.items()}
+            choices.append(
+                {
+                    "pushes": several[0].training.info.pushes,
+                    "start": start,
+                    "change": change,
+                    "score": float(np.mean([*scores.values()])),
+                    "scores": scores,
+                }
+            )
     table = join(tables) | {"choices": choices}
     write_json(chain.out / "table.json", table)
     return table
@@ -71,11 +84,16 @@ class _Tuner:
     scale: Scale
     chain: Chain
 
+    def with_few(self) -> "_Tuner":
+        """Return what tunes on the first of the recordings alone."""
+        return replace(self, training=self.training.first(_FEW[self.scale]))
+
     def tune(self, start: str, change: Change) -> dict[str, Any]:
         """Return the table of the tests."""
-        config = recipe(start, self.scale, self.training.info.pushes, change)
+        pushes = self.training.info.pushes
+        config = recipe(start, self.scale, pushes, change)
         way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
-        name = f"{self.robot}/{way}"
+        name = f"{self.robot}/{pushes}-pushes/{way}"
         result = self.chain.train(
             "sain", self.training, config, name=name, start_from=start
         )

@@ -24,10 +24,11 @@ class FitConfig:
     """Of Adam at the start."""
     halve_every: int = 2_500
     """Iterations after which the learning rate is halved."""
-    l2: float = 1e-6
+    l2: float | None = 1e-6
     """Weight of the squared weights in the loss (the paper's 1e-3 is for a loss in
     metres, not for the standardised one). Of a network that training goes on from, the
-    squares of what is changed are meant."""
+    squares of what is changed are meant. None: 1 / pushes, for the fewer pushes there
+    are, the less they should change."""
     steps: int = 200
     """Steps of a push that are trained on; pushes of 600 steps, say, need 600."""
     hold: int = 1
@@ -91,7 +92,8 @@ class FitConfig:
             require_option(math.isfinite(value) and value > 0, name, "positive", value)
         weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
         others = ("linear_from", "average", "patience", "seed")
-        for name in ("l2", *weights, *others):
+        l2 = () if self.l2 is None else ("l2",)
+        for name in (*l2, *weights, *others):
             value = getattr(self, name)
             require_option(
                 math.isfinite(value) and value >= 0, name, "0 or more", value
@@ -102,6 +104,15 @@ class FitConfig:
             require_option(
                 share > 0, "patience", "0 without --validation-share", self.patience
             )
+
+    def for_pushes(self, pushes: int) -> "FitConfig":
+        """Return the settings with a number for what so many pushes decide.
+
+        The loss is the mean over pushes. Were it their sum, as the logarithm of a
+        likelihood is, what is believed before any push would have the same weight
+        beside it however many there are: divided by their number, 1 / pushes.
+        """
+        return replace(self, l2=1 / pushes) if self.l2 is None else self
 
 
 # For what goes on from a network, and below for what is added to the engine, on few
@@ -119,5 +130,10 @@ FINE_TUNING = FitConfig(
     log_every=25,
 )
 RESIDUAL_TUNING = replace(
-    FINE_TUNING, iterations=1200, halve_every=800, hold=8, weight_rotation=2.0
+    FINE_TUNING,
+    iterations=1200,
+    halve_every=800,
+    l2=None,
+    hold=8,
+    weight_rotation=2.0,
 )

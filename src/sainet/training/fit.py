@@ -96,6 +96,7 @@ def fit(
     assumed = find_assumed_engine(assumed_engine)
     from_engine = start_from == FROM_ENGINE
     start = None if from_engine else _start(start_from)
+    config = config.for_pushes(store.info.pushes)
     task = Task(model, store, config, assumed, start, from_engine)
     check_data(task)
     devices = jax.device_count()

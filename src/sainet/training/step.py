@@ -152,29 +152,32 @@ def make_step(
     (see `even_batch`), and returns the next state and the mean loss of the pushes, l2
     left out.
     """
-    gradient = make_gradient(weights, config.hold)
+    if config.l2 is None:
+        raise ValueError("l2 is None; take the settings of FitConfig.for_pushes")
+    gradient, l2 = make_gradient(weights, config.hold), config.l2
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
         pushes = jnp.sum(batch.is_observed)
-        return _update(state, start, summed, pushes, config), total / pushes
+        return _update(state, start, summed, pushes, config, l2), total / pushes
 
     return step
 
 
 # Compiled once for each set of settings, however many networks are trained by them.
-@partial(jax.jit, static_argnames="config")
+@partial(jax.jit, static_argnames=("config", "l2"))
 def _update(
     state: FitState,
     start: Trained | None,
     summed: Trained,
     pushes: Array,
     config: FitConfig,
+    l2: float,
 ) -> FitState:
     """Take Adam's step along the mean gradient of so many pushes, l2 added."""
     layers = trained_layers(state.network)
     change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
-    mean = jax.tree.map(lambda g, w: g / pushes + 2 * config.l2 * w, summed, change)
+    mean = jax.tree.map(lambda g, w: g / pushes + 2 * l2 * w, summed, change)
     updates, moments = make_optimizer(config).update(mean, state.optimizer, layers)
     layers = optax.apply_updates(layers, updates)
     average = state.average
