@@ -159,7 +159,8 @@ def make_step(
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
         pushes = jnp.sum(batch.is_observed)
-        return _update(state, start, summed, pushes, config, l2), total / pushes
+        after = _update(state, start, summed, pushes, config=config, l2=l2)
+        return after, total / pushes
 
     return step
 
@@ -171,6 +172,7 @@ def _update(
     start: Trained | None,
     summed: Trained,
     pushes: Array,
+    *,
     config: FitConfig,
     l2: float,
 ) -> FitState:
