@@ -5,7 +5,7 @@
 
 Of a training it keeps the network, its card and its log; of trials what became of every
 goal, without the pushes. With them back in place a table is made again in minutes, for
-finished steps are not run again. Neither writes over anything.
+finished steps are not run again. Neither writes over what is finished.
 """
 
 import argparse
@@ -47,10 +47,10 @@ def restore(receipts: Path, runs: Path) -> list[Path]:
 
 
 def _trainings(here: Path, there: Path) -> Iterator[Path]:
-    """Copy finished trainings to where there is none."""
+    """Copy finished trainings to where they are not finished."""
     for card in (path for name in TRAININGS for path in here.glob(f"{name}/*/{CARD}")):
         to = there / card.parent.relative_to(here)
-        if not to.exists():
+        if not (to / CARD).exists():
             for name in _TRAINING:
                 write_bytes(to / name, (card.parent / name).read_bytes())
             yield to

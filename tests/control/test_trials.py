@@ -272,6 +272,7 @@ def test_receipts_put_back_spare_running_again(done, tmp_path, monkeypatch):
         for name in tool["_TRAINING"]:
             (folder / name).write_text(name)
     (unfinished / "card.json").unlink()
+    shutil.copytree(unfinished, receipts / "robot-paper" / "sain")  # was interrupted
     kept = [str(path.relative_to(receipts)) for path in tool["keep"](runs, receipts)]
     assert kept == ["robot-paper/sain", f"{tool['TRIALS']}/cell.jsonl"]
     tool["restore"](receipts, elsewhere)
