@@ -14,7 +14,7 @@ import pytest
 from models.test_checkpoint import write_network
 from sainet.control import trials
 from sainet.control.config import ControlConfig
-from sainet.control.summary import paired_test, summarise
+from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trials import episode_file, make_trial, run_trials
 from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs import CONFIG as CONFIG_FILE
@@ -258,6 +258,16 @@ def test_pairs_are_compared_exactly():
     assert (found["only_one"], found["only_other"]) == (6, 0)
     assert found["p"] == pytest.approx(2 * 0.5**6)
     assert paired_test(one, one)["p"] == 1.0
+
+
+def test_pairs_are_compared_by_each_measure():
+    fine = records_of([True])
+    late, far = records_of([True], pushes=26), records_of([True], final=4.1)
+    for other, apart in ((late, "within_25_pushes"), (far, "within_4_mm")):
+        found = {measure: paired_test(fine, other, measure) for measure in MEASURES}
+        unlike = {measure: pair["only_one"] for measure, pair in found.items()}
+        assert unlike == dict.fromkeys(MEASURES, 0) | {apart: 1}
+        assert not any(pair["only_other"] for pair in found.values())
 
 
 def test_receipts_put_back_spare_running_again(done, tmp_path, monkeypatch):

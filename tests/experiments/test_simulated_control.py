@@ -32,8 +32,10 @@ def test_models_push_to_the_same_goals(make, tmp_path, monkeypatch):
     table = make("simulated-control")
     assert [row["model"] for row in table["rows"]] == ["physics", "physics-calibrated"]
     assert [row["trials"] for row in table["rows"]] == [2, 2]
-    (pair,) = table["pairs"]
-    assert (pair["only_one"], pair["only_other"], pair["p"]) == (0, 0, 1.0)
+    pairs = {pair["measure"]: pair for pair in table["pairs"]}
+    assert tuple(pairs) == ("solved", "within_4_mm", "within_25_pushes")
+    for pair in pairs.values():
+        assert (pair["only_one"], pair["only_other"], pair["p"]) == (0, 0, 1.0)
     goals = [
         read_json(path)["goal_mm"] for path in sorted(tmp_path.rglob("episodes/*.json"))
     ]
@@ -59,9 +61,14 @@ def result():
     none = {"solved": 0, "success": 0.0, "median_pushes": None, "ended_early": 0}
     rows = [row | {"model": "sain"}, row | none | {"model": "in"}]
     pair = {"group": "hard, tree", "model": "sain", "against": "in"}
-    pair |= {"only_one": 6, "only_other": 1, "p": 0.125}
+    counts = {"only_one": 6, "only_other": 1, "p": 0.125}
+    pairs = [
+        pair | counts | {"measure": "solved"},
+        pair | counts | {"measure": "within_4_mm"},
+        pair | counts | {"measure": "within_25_pushes", "p": 0.031},
+    ]
     theirs = {"group": "hard, greedy", "model": "in", "trials": 25, "success": 0.88}
-    return {"rows": rows, "pairs": [pair], "published": [theirs]}
+    return {"rows": rows, "pairs": pairs, "published": [theirs]}
 
 
 def test_the_table_says_everything_once():
@@ -71,7 +78,10 @@ def test_the_table_says_everything_once():
     text = capture.get()
     for part in ("98/100", "93%–99%", "24.5", "61%", "0.415", "22/25", "published"):  # noqa: RUF001
         assert part in text
-    assert "SAIN alone solved 6, IN alone 1 (exact McNemar p = 0.12)" in text
+    told = "SAIN alone 6, IN alone 1 (exact McNemar p = "
+    assert f"hard, tree, solved: {told}0.12)" in text
+    assert f"hard, tree, within 25 pushes: {told}0.031)" in text
+    assert "within 4 mm: " not in text  # may be chance
     assert "SAIN: 1 of 2 not solved ended as the disk was seen there" in text
     assert "IN: " not in text.replace("SAIN: ", "")
     lines = control_markdown(result()).splitlines()

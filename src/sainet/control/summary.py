@@ -4,10 +4,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Bool
 from scipy.stats import binomtest
 
 from sainet.control.episode import SOLVED
 
+# What an episode reaches or does not.
+MEASURES = ("solved", "within_4_mm", "within_25_pushes")
 _NEAR_MM = 4.0
 _FEW_PUSHES = 25
 
@@ -16,9 +19,8 @@ Records = Sequence[dict[str, Any]]
 
 def summarise(records: Records) -> dict[str, Any]:
     """Return success with its Wilson 95 % interval, medians and shares."""
-    solved = np.array([record["solved"] for record in records])
-    pushes = np.array([record["pushes"] for record in records])
-    final = np.array([record["final_mm"] for record in records])
+    solved, near, soon = (reached(records, measure) for measure in MEASURES)
+    pushes, final = _column(records, "pushes"), _column(records, "final_mm")
     seconds = [s for record in records for s in record["decision_s"]]
     # Seen within the tolerance, and truly without: sight is noisy.
     ended = np.array([record["reason"] == SOLVED for record in records])
@@ -30,27 +32,42 @@ def summarise(records: Records) -> dict[str, Any]:
         "interval": [float(interval.low), float(interval.high)],
         "median_pushes": float(np.median(pushes[solved])) if solved.any() else None,
         "median_decision_s": float(np.median(seconds)) if seconds else None,
-        "within_4_mm": float((final <= _NEAR_MM).mean()),
-        "within_25_pushes": float((solved & (pushes <= _FEW_PUSHES)).mean()),
+        "within_4_mm": float(near.mean()),
+        "within_25_pushes": float(soon.mean()),
         "median_final_mm": float(np.median(final)),
         "ended_early": int((ended & ~solved).sum()),
     }
 
 
-def paired_test(one: Records, other: Records, key: str = "solved") -> dict[str, Any]:
+def reached(records: Records, measure: str) -> Bool[np.ndarray, " record"]:
+    """Return which episodes reached one of `MEASURES`."""
+    solved = _column(records, "solved")
+    if measure == "within_4_mm":
+        return _column(records, "final_mm") <= _NEAR_MM
+    if measure == "within_25_pushes":
+        return solved & (_column(records, "pushes") <= _FEW_PUSHES)
+    return solved
+
+
+def _column(records: Records, name: str) -> np.ndarray:
+    return np.array([record[name] for record in records])
+
+
+def paired_test(
+    one: Records, other: Records, measure: str = "solved"
+) -> dict[str, Any]:
     """Compare two models on the same goals by the exact McNemar test.
 
     Args:
         one: the records of a model, goal by goal.
         other: those of another, of the same goals.
-        key: of what either did or did not.
+        measure: one of `MEASURES`.
 
     Returns:
-        How many goals only the one and only the other solved, and the p-value.
+        How many goals only the one and only the other reached, and the p-value.
     """
-    pairs = [(bool(a[key]), bool(b[key])) for a, b in zip(one, other, strict=True)]
-    only_one = sum(a and not b for a, b in pairs)
-    only_other = sum(b and not a for a, b in pairs)
+    mine, theirs = reached(one, measure), reached(other, measure)
+    only_one, only_other = int((mine & ~theirs).sum()), int((theirs & ~mine).sum())
     unlike = only_one + only_other
     p = binomtest(only_one, unlike).pvalue if unlike else 1.0
     return {"only_one": only_one, "only_other": only_other, "p": float(p)}

@@ -11,7 +11,7 @@ from itertools import combinations
 from typing import Any
 
 from sainet.control.config import ControlConfig
-from sainet.control.summary import paired_test, summarise
+from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trials import run_trials
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
@@ -49,8 +49,9 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
             for model, found in records.items()
         ]
         pairs += [
-            {**named, "model": other, "against": one}
-            | paired_test(records[other], records[one])
+            {**named, "measure": measure, "model": other, "against": one}
+            | paired_test(records[other], records[one], measure)
+            for measure in MEASURES
             for one, other in combinations(MODELS, 2)
         ]
     table = {"rows": rows, "pairs": pairs, "published": list(SIMULATED_CONTROL)}

@@ -17,6 +17,7 @@ HEADINGS = (
     *("within 25 pushes", "within 4 mm", "decision (s)"),
 )
 _TEXT_COLUMNS = 2
+_CHANCE = 0.05
 
 
 def is_control(result: Mapping[str, Any]) -> bool:
@@ -64,8 +65,7 @@ def control_html(result: Mapping[str, Any]) -> str:
 
 
 def sentences(result: Mapping[str, Any]) -> list[str]:
-    """Say which goals one model solved and another did not, and what sight missed."""
-    pairs = list(result.get("pairs") or ())
+    """Say what sight missed, and which goals one model reached and another did not."""
     labels = _labels(result)
     early = [
         f"{row['group']}, {labels[row['model']]}: {row['ended_early']} of "
@@ -73,13 +73,21 @@ def sentences(result: Mapping[str, Any]) -> list[str]:
         for row in result["rows"]
         if row["ended_early"]
     ]
+    pairs = filter(_is_told, result.get("pairs") or ())
     return early + [
-        f"{pair['group']}: {labels[pair['model']]} alone solved {pair['only_one']}, "
+        f"{pair['group']}, {pair['measure'].replace('_', ' ')}: "
+        f"{labels[pair['model']]} alone {pair['only_one']}, "
         f"{labels[pair['against']]} alone {pair['only_other']} "
         f"(exact McNemar p = {pair['p']:.2g})"
         for pair in pairs
-        if pair["only_one"] or pair["only_other"]
     ]
+
+
+def _is_told(pair: Mapping[str, Any]) -> bool:
+    """Tell every difference in success, and of the other measures what is no chance."""
+    if pair["measure"] == "solved":
+        return bool(pair["only_one"] or pair["only_other"])
+    return pair["p"] < _CHANCE
 
 
 def _labels(result: Mapping[str, Any]) -> dict[str, str]:
