@@ -15,7 +15,8 @@ from models.test_checkpoint import write_network
 from sainet.control import trials
 from sainet.control.config import ControlConfig
 from sainet.control.summary import MEASURES, paired_test, summarise
-from sainet.control.trials import episode_file, make_trial, run_trials
+from sainet.control.trial import make_trial
+from sainet.control.trials import episode_file, run_trials
 from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs import CONFIG as CONFIG_FILE
 from sainet.runs import read_json, write_json

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from sainet.bench.timing import check_runs
 from sainet.control.config import ControlConfig
-from sainet.control.trials import Trial, make_trial
+from sainet.control.trial import Trial, make_trial
 from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.registry import load_dynamics

@@ -1,18 +1,16 @@
 """An episode as JSON values: what was decided, predicted and seen at every push."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
+from sainet.control.trial import Trial
 from sainet.errors import BadInput
 from sainet.runs import read_json
 from sainet.scene import State
-
-if TYPE_CHECKING:
-    from sainet.control.trials import Trial
 
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
 _NUMBER = (int, float)
@@ -38,7 +36,7 @@ _TURN_FIELDS = ("observed", "planned", "actual", "pusher")
 
 
 def record(
-    config: ControlConfig, index: int, trial: "Trial", episode: Episode
+    config: ControlConfig, index: int, trial: Trial, episode: Episode
 ) -> dict[str, Any]:
     """Return the record of an episode; lengths in mm, angles in degrees.
 
@@ -91,7 +89,7 @@ def read_record(path: Path) -> dict[str, Any]:
     return found
 
 
-def _turn(trial: "Trial", turn: Turn) -> dict[str, Any]:
+def _turn(trial: Trial, turn: Turn) -> dict[str, Any]:
     push, plan = turn.recording.push, turn.plan
     return {
         "contact_angle_deg": _degrees(push.contact_angle),

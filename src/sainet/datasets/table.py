@@ -15,8 +15,9 @@ from sainet.datasets.recorded_arrays import (
     write_pushes,
 )
 from sainet.datasets.store import Store
+from sainet.datasets.table_file import read_rows, read_table_bytes
 from sainet.datasets.table_pushes import to_pushes
-from sainet.datasets.table_rows import TableRows, read_rows, read_table_bytes
+from sainet.datasets.table_rows import TableRows
 from sainet.errors import BadTable
 from sainet.runs import content_hash
 

@@ -1,0 +1,87 @@
+"""One trial: a goal, and the world that it lies in."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from sainet.control.config import ControlConfig
+from sainet.engines import make_engine
+from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
+from sainet.engines.config import NoiseConfig, at_level
+from sainet.robots.simulated import SimulatedRobot
+from sainet.scene import Scene, State, at_rest
+from sainet.tasks.goals import draw_goal
+from sainet.tasks.push_to_goal import PushToGoal
+
+# The disks that are pushed: unlike those that the assumed engine believes in.
+MASS = (0.9, 1.0)  # kg
+RADIUS = (0.054, 0.059)  # m
+CONTACT_FRICTION, PUSHER_RADIUS = 0.25, 0.0048
+_TABLE_FRICTION = (0.05, 0.25)
+_WORLD = 0x3071D
+
+
+class Trial(NamedTuple):
+    """One goal and the world that it lies in."""
+
+    robot: SimulatedRobot
+    task: PushToGoal
+    scene: Scene  # as model and task believe it
+
+
+def make_trial(config: ControlConfig, index: int) -> Trial:
+    """Draw the world and the goal of one trial; models and planners see the same."""
+    rng = np.random.default_rng([_WORLD, config.seed, index])
+    true = _scene(MASS, RADIUS, config.disks, float(rng.uniform(*_TABLE_FRICTION)))
+    state = _in_a_row(np.asarray(true.radius))
+    robot = SimulatedRobot(
+        make_engine(config.world),
+        true,
+        state,
+        noise=at_level(NoiseConfig(), config.noise_level),
+        rng=rng,
+    )
+    moved = config.disks - 1
+    goal = draw_goal(
+        config.goals,
+        config.seed,
+        index,
+        disk=np.asarray(state.position)[moved],
+        axis=0.0,
+        radius=float(true.radius[moved]),
+    )
+    task = PushToGoal(
+        jnp.asarray(goal, jnp.float32), moved, config.tolerance, config.alignment
+    )
+    told = (PAPER_MASS, PAPER_RADIUS) if config.knows == "nominal" else (MASS, RADIUS)
+    return Trial(robot, task, _scene(*told, config.disks, PAPER_FRICTION))
+
+
+def _scene(
+    mass: tuple[float, ...], radius: tuple[float, ...], disks: int, friction: float
+) -> Scene:
+    """Return a scene; disks beyond the second have the mean of both."""
+
+    def each(values: tuple[float, ...]) -> jax.Array:
+        mean = sum(values) / len(values)
+        return jnp.array((*values, *[mean] * disks)[:disks], jnp.float32)
+
+    contact = jnp.float32(CONTACT_FRICTION)
+    return Scene(
+        mass=each(mass),
+        radius=each(radius),
+        table_friction=jnp.float32(friction),
+        disk_friction=contact,
+        pusher_friction=contact,
+        pusher_radius=jnp.float32(PUSHER_RADIUS),
+    )
+
+
+def _in_a_row(radius: np.ndarray) -> State:
+    """Return disks that touch, along the x axis, the first one at the origin."""
+    x = np.concatenate([[0.0], np.cumsum(radius[:-1] + radius[1:])])
+    position = jnp.asarray(np.stack([x, 0 * x], axis=-1), jnp.float32)
+    behind = jnp.array([-2 * radius[0], 0], jnp.float32)
+    return at_rest(position, jnp.zeros(len(radius)), behind)
