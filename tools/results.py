@@ -21,12 +21,15 @@ from typing import Any
 
 from receipts import RECEIPTS, keep, restore
 
+from sainet.control.record import read_record
+from sainet.control.trials import episode_file
 from sainet.engines.identified import CAMERA
 from sainet.models.registry import OF_STROKES
 from sainet.runs import manifest
 from sainet.training.config import RESIDUAL_TUNING, FitConfig
 from sainet.viz.control_table import control_markdown
 from sainet.viz.tables import to_markdown
+from sainet.viz.video import write_film
 
 ROOT = Path(__file__).resolve().parent.parent
 SAINET = str(Path(sys.executable).with_name("sainet"))
@@ -317,10 +320,6 @@ _KIND = (
 
 def _control() -> str:
     words = _reproduce("simulated-control")
-    out = RUNS / "control"
-    shown = ("control", "--goals", "hard", "--planner", "tree", "--world", "bullet")
-    shown += ("--trials", "3", "--out", str(out))
-    _run(*shown)
     return (
         f"`sainet {' '.join(words)}`: 100 goals each (50 with nominal properties alone "
         "and 50 with three disks), Bullet with noise as the world, disks of 0.9 and "
@@ -328,10 +327,22 @@ def _control() -> str:
         "Simulated, all of it. Published rows are the paper's, of 25 goals. Below the "
         "table: every pair that differs in what was solved; of the other two measures "
         "the pairs with p < 0.05, of 72, so that some are chance.\n\n"
-        f"{control_markdown(_run(*words))}\n"
-        f"The first three hard goals of SAIN, `sainet {' '.join(shown)}`: disks at the "
-        "start transparent, at the end solid, with the paths of their centres; disk 1 "
-        "red, disk 2 blue, its centre a white cross in the target region.\n\n"
+        f"{control_markdown(_run(*words))}\n{_episodes()}"
+    )
+
+
+def _episodes() -> str:
+    """Draw three episodes, and the film of the first, which the README shows."""
+    out = RUNS / "control"
+    words = ("control", "--goals", "hard", "--planner", "tree", "--world", "bullet")
+    words += ("--trials", "3", "--out", str(out))
+    _run(*words)
+    write_film(read_record(episode_file(ROOT / out, 0)), FIGURES / "episode.gif")
+    return (
+        f"The first three hard goals, `sainet {' '.join(words)}`: disks at the start "
+        "transparent, at the end solid, with the paths of their centres; disk 1 red, "
+        "disk 2 blue, its centre a white cross in the target region. The "
+        "[first of them](figures/episode.gif) moves.\n\n"
         f"{_figure(out / 'episodes.svg', 'SAIN pushes disk 2 to three hard goals')}"
     )
 

@@ -141,7 +141,8 @@ class _Stage:
         chart, distances = self._chart, self.frames.distances
         chart.axhspan(0, self.record["tolerance_mm"], color=TARGET, alpha=0.5, lw=0)
         color = body_color(self.record, self.record["moved"])
-        (curve,) = chart.plot([], [], "o-", color=color, markersize=3)
+        look = {"color": color, "markersize": 3, "clip_on": False}
+        (curve,) = chart.plot([], [], "o-", **look)
         chart.set(xlim=(0, max(len(distances) - 1, 1)), ylim=(0, 1.05 * max(distances)))
         chart.set(xlabel="push", title="Distance from the goal (mm)")
         add_grid(chart)
