@@ -141,7 +141,8 @@ class _Stage:
         chart, distances = self._chart, self.frames.distances
         chart.axhspan(0, self.record["tolerance_mm"], color=TARGET, alpha=0.5, lw=0)
         color = body_color(self.record, self.record["moved"])
-        look = {"color": color, "markersize": 3, "clip_on": False}
+        # Its last point lies on the edge; that is no reason to make the chart smaller.
+        look = {"color": color, "markersize": 3, "clip_on": False, "in_layout": False}
         (curve,) = chart.plot([], [], "o-", **look)
         chart.set(xlim=(0, max(len(distances) - 1, 1)), ylim=(0, 1.05 * max(distances)))
         chart.set(xlabel="push", title="Distance from the goal (mm)")
