@@ -24,10 +24,10 @@ CACHE = {
 }
 for name, value in CACHE.items():
     os.environ[name.upper()] = value
-# Most of a test is compilation: no optimisation, and XLA's older emitters, which compile
-# in half the time and run slower. XLA_FLAGS in the environment takes precedence: with
-# XLA_FLAGS= the tests run the code that users run, to the last bit; CI does that for
-# the engine, the networks and the search.
+# Most of a test is compilation: no optimisation, and XLA's older emitters, which
+# compile in half the time and run slower. XLA_FLAGS in the environment takes
+# precedence: with XLA_FLAGS= the tests run the code that users run, to the last bit; CI
+# does that for the engines, the networks and the search.
 QUICK = "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
 os.environ.setdefault("XLA_FLAGS", QUICK)
 jax.config.update("jax_compilation_cache_dir", CACHE["jax_compilation_cache_dir"])

@@ -80,11 +80,12 @@ def pins(folder: Path) -> Path:
 def install(python: Path, wheel: Path, folder: Path) -> Path:
     """A fresh environment with the wheel and its base dependencies, no extras."""
     venv = folder / "venv"
-    run_well(python, "-m", "venv", venv)
-    # No bytecode: compiling half a gigabyte takes longer than unpacking it.
+    # This environment's own pip fills it; and no bytecode: compiling half a gigabyte
+    # takes longer than unpacking it.
+    run_well(python, "-m", "venv", "--without-pip", venv)
+    pip = (sys.executable, "-m", "pip", "--python", venv / "bin" / "python")
     quick = ("--no-compile", "--quiet", "--disable-pip-version-check")
-    pip = (venv / "bin" / "pip", "install", *quick, "-c", pins(folder))
-    done = run(*pip, wheel)
+    done = run(*pip, "install", *quick, "-c", pins(folder), wheel)
     offline = any(sign in done.stdout + done.stderr for sign in OFFLINE)
     require(done.returncode == 0 or not offline, "no package index can be reached")
     assert done.returncode == 0, done.stdout + done.stderr

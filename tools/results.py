@@ -326,7 +326,9 @@ def _control() -> str:
         "1.0 kg, 54 and 59 mm; planar inside every model, networks as they ship. "
         "Simulated, all of it. Published rows are the paper's, of 25 goals. Below the "
         "table: every pair that differs in what was solved; of the other two measures "
-        "the pairs with p < 0.05, of 72, so that some are chance.\n\n"
+        "the pairs with p < 0.05, of 72, so that some are chance. Decision times are "
+        "of as many trials at once as there are cores, one core each; of a decision "
+        "that has them all, see Benchmarks.\n\n"
         f"{control_markdown(_run(*words))}\n{_episodes()}"
     )
 
