@@ -2,11 +2,14 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from support import SOURCE
 
 SAINET = [sys.executable, "-m", "sainet"]
 SMALL = ["--pushes", "24", "--chunk-size", "12", "--workers", "1", "--quiet"]
@@ -189,8 +192,7 @@ def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
 
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):
     out = tmp_path / "net"
-    few = ("--iterations", 1, "--batch-size", 4, "--steps", 5, "--quiet")
-    sainet("train", "in", "--data", pushes, "--out", out, *few)
+    shutil.copytree(SOURCE / "models" / "pretrained" / "in", out)
     card = json.loads((out / "card.json").read_text())
     (out / "card.json").write_text(json.dumps(card | {"time_step": 0.01}))
     error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr

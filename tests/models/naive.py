@@ -112,6 +112,18 @@ def to_table(local: LocalPush, motion) -> np.ndarray:
     return np.array(rows)
 
 
+def acting_on(local, motion, i: int) -> list[int]:
+    """The other disk if it is the only one, else those within 20 mm."""
+    others = [j for j in range(len(motion)) if j != i]
+    if len(others) == 1:
+        return others
+    gaps = {
+        j: np.hypot(*(motion[i, :2] - motion[j, :2])) - local.radius[[i, j]].sum()
+        for j in others
+    }
+    return [j for j in others if gaps[j] <= 0.02]
+
+
 def pair_inputs(local, motion, rate_step, i: int, j: int) -> np.ndarray:
     """What f_rel sees of the pair (eq. 4; with the simulator eq. 9)."""
     return np.concatenate(
@@ -172,11 +184,10 @@ def accelerations(network, local, motion, simulated_step, step: int) -> np.ndarr
     found = []
     for i in bodies:
         effect = np.zeros(16)
-        for j in bodies:
-            if j != i:
-                seen = pair_inputs(local, motion, rate_step, i, j)
-                seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
-                effect += layers(network.rel, seen)
+        for j in acting_on(local, motion, i):
+            seen = pair_inputs(local, motion, rate_step, i, j)
+            seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
+            effect += layers(network.rel, seen)
         seen = body_inputs(local, motion, pose_step, step, i)
         if network.sizes.place:
             seen = np.concatenate([seen, place_inputs(local, motion, i)])

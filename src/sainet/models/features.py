@@ -101,6 +101,24 @@ def pair_features(
     return jnp.stack(pairs, axis=1)
 
 
+def near_pairs(
+    motion: Float[Array, "6 body push"], still: Still, reach: float
+) -> Float[Array, "other body push"]:
+    """Return 1 for each pair of `pair_features` that is within reach, 0 for the others.
+
+    Args:
+        motion: packed motion, in columns.
+        still: in columns.
+        reach: m, the widest gap between two surfaces that counts as near.
+    """
+    gaps = []
+    for shift in range(1, motion.shape[1]):
+        offset = motion[0:2] - jnp.roll(motion[0:2], -shift, axis=1)
+        distance = jnp.sqrt(jnp.sum(offset**2, axis=0) + 1e-12)
+        gaps.append(distance - still.radius - jnp.roll(still.radius, -shift, axis=0))
+    return (jnp.stack(gaps) <= reach).astype(motion.dtype)
+
+
 def body_features(
     motion: Float[Array, "6 body push"], still: Still, drive: Drive
 ) -> Float[Array, "feature body push"]:

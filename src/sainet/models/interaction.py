@@ -17,6 +17,7 @@ from sainet.models.features import (
     Still,
     body_features,
     in_columns,
+    near_pairs,
     pair_features,
 )
 from sainet.models.relaxation import relaxation
@@ -24,6 +25,7 @@ from sainet.models.relaxation import relaxation
 WIDTHS = (128, 64, 32, 16)
 EFFECT = WIDTHS[-1]
 FEATURE_BOUND = 4.0  # standard deviations
+REACH = 0.02  # m, see `_effects`
 _CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
 
 
@@ -130,15 +132,24 @@ class InteractionNetwork(eqx.Module):
     def _effects(
         self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
     ) -> Float[Array, "effect body push"]:
-        """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j)."""
+        """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j).
+
+        Where there are others to act, a disk that is out of reach does not. The paper
+        sums over all; but the outer disks of a row are a disk apart, in training two
+        part by 2 mm, and what f_rel says of a pair that it never saw is no effect.
+        """
         _, bodies, pushes = motion.shape
-        if bodies == 1:
+        others = bodies - 1
+        if not others:
             return jnp.zeros((EFFECT, bodies, pushes), motion.dtype)
         features = pair_features(motion, still, drive)
         shown = _standardise(
             features, self.scales.pair_mean, self.scales.pair_deviation
         )
-        return jnp.sum(self.rel(shown), axis=1)
+        effects = self.rel(shown)
+        if others > 1:
+            effects = effects * near_pairs(motion, still, REACH)[None]
+        return jnp.sum(effects, axis=1)
 
     def step(
         self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
