@@ -18,7 +18,12 @@ from models.samples import (
     quick_dynamics,
 )
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
-from sainet.models.features import FeatureSizes
+from sainet.models.features import (
+    FeatureSizes,
+    in_columns,
+    near_pairs,
+    still_features,
+)
 from sainet.models.frame import (
     controls_to_frame,
     motion_from_frame,
@@ -28,7 +33,7 @@ from sainet.models.frame import (
 from sainet.models.interaction import InteractionNetwork
 from sainet.models.widen import widen
 from sainet.pushes import Push, path_controls
-from sainet.scene import TIME_STEP, at_rest, pack_motion
+from sainet.scene import TIME_STEP, at_rest, pack_motion, pair_gaps
 
 every_model = pytest.mark.parametrize("model", ["in", "sain"])
 every_kind = pytest.mark.parametrize("kind", ["robot", "direct-force"])
@@ -139,6 +144,21 @@ def test_effects_and_the_simulator_matter(model, kind):
     if model == "sain":
         other = eqx.tree_at(lambda d: d.engine, made, assumed([0, 1]))
         assert moved_by(other) > 1e-5
+
+
+def test_near_pairs_are_those_whose_gap_is_within_reach():
+    x = [0.0, 0.119, 0.24, 0.36]  # gaps of 19, 21 and 20 mm, radii of 50 mm
+    scene = make_scene(np.ones((1, 4)), [[0.05, 0.05, 0.05, 0.05]])
+    place = jnp.stack([jnp.array(x), jnp.zeros(4)], axis=-1)[None]
+    state = at_rest(place, jnp.zeros((1, 4)), jnp.full((1, 2), -1.0))
+    still = still_features(
+        scene, push_frame(scene, state), FeatureSizes("robot", False)
+    )
+    found = near_pairs(in_columns(pack_motion(state)), in_columns(still), 0.0205)
+    gaps = np.asarray(pair_gaps(scene, state))[0]
+    wanted = [[gaps[i, (i + k) % 4] <= 0.0205 for i in range(4)] for k in (1, 2, 3)]
+    assert np.sum(wanted) == 4  # the first and the last two, both ways round
+    np.testing.assert_array_equal(found[..., 0], wanted)
 
 
 def with_property(scene, name, change):

@@ -114,7 +114,7 @@ def near_pairs(
     gaps = []
     for shift in range(1, motion.shape[1]):
         offset = motion[0:2] - jnp.roll(motion[0:2], -shift, axis=1)
-        distance = jnp.sqrt(jnp.sum(offset**2, axis=0) + 1e-12)
+        distance = jnp.sqrt(jnp.sum(offset**2, axis=0))
         gaps.append(distance - still.radius - jnp.roll(still.radius, -shift, axis=0))
     return (jnp.stack(gaps) <= reach).astype(motion.dtype)
 

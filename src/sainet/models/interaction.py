@@ -134,9 +134,9 @@ class InteractionNetwork(eqx.Module):
     ) -> Float[Array, "effect body push"]:
         """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j).
 
-        Where there are others to act, a disk that is out of reach does not. The paper
-        sums over all; but the outer disks of a row are a disk apart, in training two
-        part by 2 mm, and what f_rel says of a pair that it never saw is no effect.
+        Of several others, those out of reach do not act. The paper sums over all; but
+        the outer disks of a row are a disk apart, in training two part by 2 mm, and
+        what f_rel says of a pair that it never saw is no effect.
         """
         _, bodies, pushes = motion.shape
         others = bodies - 1
