@@ -117,8 +117,23 @@ def test_engines_reports_what_the_docs_say():
     json.dumps(figures, allow_nan=False)
 
 
+def watch_starts(monkeypatch) -> list[dict[str, int]]:
+    """Return what will be in the cache of compiled code after each start (bytes)."""
+    run, kept = subprocess.run, []
+
+    def watched(command: list[str], **how) -> None:
+        run(command, **how)
+        cache = Path(how["env"]["JAX_COMPILATION_CACHE_DIR"])
+        kept.append({entry.name: entry.stat().st_size for entry in cache.iterdir()})
+
+    monkeypatch.setenv("XLA_FLAGS", "")  # what users compile is worth keeping
+    monkeypatch.setattr("sainet.bench.planning.subprocess.run", watched)
+    return kept
+
+
 @pytest.mark.slow
-def test_planning_reports_what_the_docs_say():
+def test_planning_reports_what_the_docs_say(monkeypatch):
+    kept = watch_starts(monkeypatch)
     figures = load_case("planning")(2, model="physics")
     wanted = ("full_tree_s", "greedy_s", "looked_at", "bullet_push_s", "bullet_ratio")
     wanted += ("cold_start_s", "warm_start_s", "decisions", "devices")
@@ -126,7 +141,10 @@ def test_planning_reports_what_the_docs_say():
     bullet = ("bullet_push_s", "bullet_ratio")
     assert all_finite(figures, but=() if find_spec("pybullet") else bullet)
     assert figures["looked_at"] == 72 + 72**2
-    assert figures["warm_start_s"] < figures["cold_start_s"]
+    # Times of a busy machine prove nothing; what the second start compiled does.
+    cold, warm = kept
+    compiled = [size for name, size in warm.items() if name not in cold]
+    assert max(compiled, default=0) < max(cold.values())
     json.dumps(figures, allow_nan=False)
 
 
