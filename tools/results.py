@@ -27,7 +27,7 @@ from sainet.engines.identified import CAMERA
 from sainet.models.registry import OF_STROKES
 from sainet.runs import manifest
 from sainet.training.config import RESIDUAL_TUNING, FitConfig
-from sainet.viz.control_table import control_markdown
+from sainet.viz.control_table import CHANCE, control_markdown
 from sainet.viz.tables import to_markdown
 from sainet.viz.video import write_film
 
@@ -320,6 +320,7 @@ _KIND = (
 
 def _control() -> str:
     words = _reproduce("simulated-control")
+    table = _run(*words)
     return (
         f"`sainet {' '.join(words)}`: 100 goals each (50 with nominal properties alone "
         "and 50 with three disks), Bullet with noise as the world, disks of 0.9 and "
@@ -329,7 +330,35 @@ def _control() -> str:
         "the pairs with p < 0.05, of 72, so that some are chance. Decision times are "
         "of as many trials at once as there are cores, one core each; of a decision "
         "that has them all, see Benchmarks.\n\n"
-        f"{control_markdown(_run(*words))}\n{_episodes()}"
+        f"{_reading(table)}\n\n{control_markdown(table)}\n{_episodes()}"
+    )
+
+
+def _reading(table: dict[str, Any]) -> str:
+    """Say where the choice of a model decides what is solved, and where it does not."""
+    differing = {
+        pair["group"]
+        for pair in table["pairs"]
+        if pair["measure"] == "solved" and pair["p"] < CHANCE
+    }
+    solved: dict[str, list[str]] = {}
+    for row in table["rows"]:
+        told = f"{row['model']} {row['solved']}"
+        solved.setdefault(row["group"], []).append(told)
+    level = "; ".join(group for group in solved if group not in differing)
+    apart = [
+        f"They do in *{group}*, where networks are asked about more disks than the two "
+        f"that they were trained on: {', '.join(solved[group])}."
+        if "three disks" in group
+        else f"They do in *{group}*: {', '.join(solved[group])}."
+        for group in solved
+        if group in differing
+    ]
+    return " ".join(
+        [
+            f"No two models differ (p < {CHANCE:g}) in what they solve in: {level}.",
+            *apart,
+        ]
     )
 
 

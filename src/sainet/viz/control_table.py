@@ -17,7 +17,7 @@ HEADINGS = (
     *("within 25 pushes", "within 4 mm", "decision (s)"),
 )
 _TEXT_COLUMNS = 2
-_CHANCE = 0.05
+CHANCE = 0.05  # a p below it is told
 
 
 def is_control(result: Mapping[str, Any]) -> bool:
@@ -87,7 +87,7 @@ def _is_told(pair: Mapping[str, Any]) -> bool:
     """Tell every difference in success, and of the other measures what is no chance."""
     if pair["measure"] == "solved":
         return bool(pair["only_one"] or pair["only_other"])
-    return pair["p"] < _CHANCE
+    return pair["p"] < CHANCE
 
 
 def _labels(result: Mapping[str, Any]) -> dict[str, str]:
