@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from readings import of_control, of_errors
 from receipts import RECEIPTS, keep, restore
 
 from sainet.control.record import read_record
@@ -27,7 +28,7 @@ from sainet.engines.identified import CAMERA
 from sainet.models.registry import OF_STROKES
 from sainet.runs import manifest
 from sainet.training.config import RESIDUAL_TUNING, FitConfig
-from sainet.viz.control_table import CHANCE, control_markdown
+from sainet.viz.control_table import control_markdown
 from sainet.viz.tables import to_markdown
 from sainet.viz.video import write_film
 
@@ -226,7 +227,10 @@ def _table(
 ) -> str:
     """Return the table of an experiment, what is said of it, and its figure if any."""
     words = _reproduce(name, *more)
-    parts = [f"`sainet {' '.join(words)}`: {said}", to_markdown(_run(*words))]
+    table = _run(*words)
+    parts = [f"`sainet {' '.join(words)}`: {said}"]
+    parts += [of_errors(table)] if table.get("published") else []
+    parts += [to_markdown(table)]
     if figure:
         drawn = RUNS / f"{name}-paper" / f"{figure}.svg"
         parts.append(_figure(drawn, "Errors over training pushes"))
@@ -330,35 +334,7 @@ def _control() -> str:
         "the pairs with p < 0.05, of 72, so that some are chance. Decision times are "
         "of as many trials at once as there are cores, one core each; of a decision "
         "that has them all, see Benchmarks.\n\n"
-        f"{_reading(table)}\n\n{control_markdown(table)}\n{_episodes()}"
-    )
-
-
-def _reading(table: dict[str, Any]) -> str:
-    """Say where the choice of a model decides what is solved, and where it does not."""
-    differing = {
-        pair["group"]
-        for pair in table["pairs"]
-        if pair["measure"] == "solved" and pair["p"] < CHANCE
-    }
-    solved: dict[str, list[str]] = {}
-    for row in table["rows"]:
-        told = f"{row['model']} {row['solved']}"
-        solved.setdefault(row["group"], []).append(told)
-    level = "; ".join(group for group in solved if group not in differing)
-    apart = [
-        f"They do in *{group}*, where networks are asked about more disks than the two "
-        f"that they were trained on: {', '.join(solved[group])}."
-        if "three disks" in group
-        else f"They do in *{group}*: {', '.join(solved[group])}."
-        for group in solved
-        if group in differing
-    ]
-    return " ".join(
-        [
-            f"No two models differ (p < {CHANCE:g}) in what they solve in: {level}.",
-            *apart,
-        ]
+        f"{of_control(table)}\n\n{control_markdown(table)}\n{_episodes()}"
     )
 
 
