@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from scipy.stats import t as student_t
 
 from sainet.evaluation.intervals import (
     difference_interval,
@@ -203,20 +204,36 @@ def test_differences_are_paired():
     assert -1.2 < low[0] < high[0] < -0.8
 
 
-def test_trainings_are_resampled_as_well():
+def test_trainings_count_as_in_the_t_interval():
     rng = np.random.default_rng(6)
     pushes = rng.normal(3, 1, (1, 200, 1))
     luck = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])[:, None, None]
     mean, low, high = mean_interval(pushes + luck)
     _, low_one, high_one = mean_interval(pushes)
     assert mean == pytest.approx(pushes.mean())
-    # Their spread of 0.71 over the root of 5, beside 1 over the root of 200.
-    wanted = 2 * 1.96 * np.hypot(0.707 / np.sqrt(5), 1 / np.sqrt(200))
-    assert high[0] - low[0] == pytest.approx(wanted, rel=0.1)
+    # The t interval of 5 (SciPy's), hardly widened by 1 over the root of 200 pushes.
+    _, wanted = student_t.interval(0.95, 4, 0, 0.7906 / np.sqrt(5))
+    assert high[0] - low[0] == pytest.approx(2 * wanted, rel=0.1)
     assert high[0] - low[0] > 3 * (high_one[0] - low_one[0])
     # Trainings of two models are drawn apart: alike luck is no pair.
     _, low, high = difference_interval(pushes + luck, pushes + luck + 0.1)
     assert low[0] < -0.5 < 0.3 < high[0]
+
+
+@pytest.mark.parametrize("trainings", [3, 5])
+def test_intervals_of_few_trainings_cover_about_95_times_in_100(trainings):
+    rng = np.random.default_rng(8)
+    held = [[], []]
+    for _ in range(400):
+        luck = rng.normal(0, 1, (2, trainings, 1, 1))
+        one, other = luck + rng.normal(0, 1, (1, 40, 1))
+        for which, (_, low, high) in enumerate(
+            (mean_interval(one), difference_interval(one, other))
+        ):
+            held[which].append(bool(low[0] <= 0 <= high[0]))
+    of_mean, of_difference = map(np.mean, held)
+    assert 0.92 < of_mean < 0.98
+    assert 0.93 < of_difference  # of few trainings, a little wide
 
 
 def test_pooled_trainings_are_one_model():
