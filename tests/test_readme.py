@@ -1,22 +1,25 @@
-"""What README.md tells people to type has to exist."""
+"""What README.md and docs/ tell people to type has to exist."""
 
+import json
 import re
 import shlex
 import subprocess
 import sys
-from functools import cache
 
 import pytest
 
 from support import REPOSITORY
 
 README = REPOSITORY / "README.md"
-COMMAND_LINE = "from sainet.cli import main; raise SystemExit(main())"
 
 
 def shell_lines(text: str) -> list[str]:
-    """Commands in ```bash blocks: continued lines joined, prompts and comments off."""
+    """Commands in ```bash blocks: continued lines joined, prompts and comments off.
+
+    In blocks that are indented instead, what begins with `sainet` or `make`.
+    """
     blocks = re.findall(r"^```bash\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    blocks += re.findall(r"^    ((?:sainet|make) .*)", text, re.MULTILINE)
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
     words = (shlex.split(line.removeprefix("$ "), comments=True) for line in lines)
     return [shlex.join(line) for line in words if line]
@@ -35,36 +38,35 @@ def make_targets(text: str) -> set[str]:
     return {*inline, *re.findall(r"^make ([a-z][a-z-]*)", typed, re.MULTILINE)}
 
 
-@cache
-def help_of(*words: str) -> subprocess.CompletedProcess[str]:
-    """What `sainet WORDS --help` answers."""
-    command = [sys.executable, "-c", COMMAND_LINE, *words, "--help"]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
+COMMANDS = {page.name: commands(page.read_text()) for page in PAGES}
+# Reads a list of commands; answers with what each asks for and where that is written.
+# In a process of its own: the types of settings that are left to give are not checked.
+PARSER = """
+import json, shlex, sys
+from sainet.cli.entry import parse
+asked = []
+for command in json.load(sys.stdin):
+    print(command, file=sys.stderr)  # should it fail
+    found = parse(shlex.split(command)[1:])
+    asked.append([str(getattr(found, "out", "")), repr(found)])
+json.dump(asked, sys.stdout)
+"""
 
 
-def leading_words(arguments: list[str]) -> list[str]:
-    """The subcommand: words before the first option, at most two (`generate robot`)."""
-    words: list[str] = []
-    for word in arguments[:2]:
-        if not re.fullmatch(r"[a-z][a-z-]*", word):
-            break
-        words.append(word)
-    return words
-
-
-@pytest.mark.parametrize("command", commands(README.read_text()))
-def test_a_command_of_the_readme_parses(command: str):
-    arguments = shlex.split(command)[1:]
-    words = leading_words(arguments)
-    if words:
-        answer = help_of(*words)
-        assert answer.returncode == 0, answer.stdout + answer.stderr
-        assert f"sainet {words[0]}" in answer.stdout, "no such subcommand"
-    else:
-        answer = help_of()
-    options = [word.partition("=")[0] for word in arguments if word.startswith("--")]
-    unknown = [option for option in options if option not in answer.stdout]
-    assert not unknown, answer.stdout
+@pytest.mark.parametrize("page", COMMANDS)
+def test_commands_parse_and_no_two_of_a_page_want_one_folder_for_two_things(page: str):
+    found = subprocess.run(
+        [sys.executable, "-c", PARSER],
+        input=json.dumps(COMMANDS[page]),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert found.returncode == 0, found.stdout + found.stderr
+    folders: dict[str, str] = {}
+    for out, asked in filter(lambda pair: pair[0], json.loads(found.stdout)):
+        assert folders.setdefault(out, asked) == asked, out
 
 
 def test_every_make_target_of_the_readme_exists():
@@ -83,5 +85,6 @@ def test_the_readme_names_the_test_command_that_ci_runs():
 
 def test_this_reader_of_readmes_sees_commands():
     text = "```bash\n$ sainet demo  # all\nsainet train \\\n  sain\nmake test\n```\n"
-    assert commands(text) == ["sainet demo", "sainet train sain"]
+    text += "\n    sainet bench  # all\n"
+    assert commands(text) == ["sainet demo", "sainet train sain", "sainet bench"]
     assert make_targets(text + "`make check`") == {"test", "check"}

@@ -60,6 +60,22 @@ Start with 'sainet demo': the whole method, small, in under three minutes."""
 INTERRUPTED = 130
 
 
+def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
+    """Return the command that these words ask for, not yet run.
+
+    Raises:
+        BadInput: a setting that cannot be.
+        SystemExit: help was asked for (0), or there is no such command or option (2).
+    """
+    return tyro.cli(
+        _command(words),
+        args=list(words) or ["--help"],
+        prog="sainet",
+        description=_DESCRIPTION,
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
+    )
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status: 0, 1, 2 or 130 (Ctrl-C)."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -68,13 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return 0
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
     try:
-        command = tyro.cli(
-            _command(words),
-            args=words or ["--help"],
-            prog="sainet",
-            description=_DESCRIPTION,
-            config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
-        )
+        command = parse(words)
         finish(command.run(), command.output)
     except SainetError as error:
         print(f"sainet: {error}", file=sys.stderr)
