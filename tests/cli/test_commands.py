@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from sainet.cli import entry
+from sainet.cli.bench import Bench
+from sainet.cli.generate import Generate
 from support import SOURCE
 
 SAINET = [sys.executable, "-m", "sainet"]
@@ -77,6 +80,22 @@ def test_what_is_missing_is_named(tmp_path, monkeypatch, words, names):
 
 def test_an_unknown_command_is_a_usage_error():
     sainet("fly", status=2)
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [(Generate(out=Path("x")), "goes on from here"), (Bench(), "starts over")],
+)
+def test_an_interruption_says_what_the_same_command_would_do(
+    command, told, monkeypatch, capsys
+):
+    def stop(self):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(type(command), "run", stop)
+    monkeypatch.setattr(entry, "parse", lambda words: command)
+    assert entry.run(["anything"]) == entry.INTERRUPTED
+    assert capsys.readouterr().err == f"sainet: interrupted; the same command {told}.\n"
 
 
 @pytest.fixture(scope="module")

@@ -58,6 +58,7 @@ it gets wrong about pushed disks, and measure how much better it became.
 Start with 'sainet demo': the whole method, small, in under three minutes."""
 
 INTERRUPTED = 130
+_GOES_ON = (Demo, Generate, Train, Control, Reproduce)  # from where it was stopped
 
 
 def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
@@ -83,6 +84,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         print(f"sainet {sainet.__version__}")
         return 0
     logging.basicConfig(level=logging.WARNING, format="%(message)s", stream=sys.stderr)
+    command = None
     try:
         command = parse(words)
         finish(command.run(), command.output)
@@ -90,9 +92,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         print(f"sainet: {error}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        print(
-            "sainet: interrupted; the same command goes on from here.", file=sys.stderr
-        )
+        goes_on = isinstance(command, _GOES_ON)
+        way = "goes on from here" if goes_on else "starts over"
+        print(f"sainet: interrupted; the same command {way}.", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         return 0
