@@ -1,6 +1,7 @@
 """The training loop on tiny stores: it learns, resumes, and refuses what cannot be."""
 
 import json
+import re
 from dataclasses import replace
 
 import equinox as eqx
@@ -10,7 +11,13 @@ import pytest
 
 from sainet.datasets.batch import to_batch
 from sainet.datasets.schema import simulated_name
-from sainet.errors import BadInput, BadStore, Diverged, RunConflict
+from sainet.errors import (
+    BadCheckpoint,
+    BadInput,
+    BadStore,
+    Diverged,
+    RunConflict,
+)
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented, predict
@@ -256,3 +263,16 @@ def test_a_log_forgets_what_comes_after_the_checkpoint_and_what_was_cut(tmp_path
     assert read_log(tmp_path) == lines
     assert rewind_log(tmp_path, 10) == lines[:2]
     assert read_log(tmp_path) == lines[:2]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"{", b"[]", b'{"loss": 1}', b'{"iteration": 1, "loss": "x"}', b"\xff", b""],
+)
+def test_a_damaged_line_of_a_log_is_named(tmp_path, line):
+    append_log(tmp_path, {"iteration": 5, "loss": 1.0})
+    with (tmp_path / LOG).open("ab") as file:
+        file.write(line + b"\n")
+    says = rf"^{re.escape(str(tmp_path / LOG))}: line 2 is damaged.*run the same"
+    with pytest.raises(BadCheckpoint, match=says):
+        read_log(tmp_path)

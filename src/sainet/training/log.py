@@ -4,16 +4,36 @@ import json
 from pathlib import Path
 from typing import Any
 
-from sainet.runs import write_bytes
+from sainet.errors import BadCheckpoint
+from sainet.runs import is_number, write_bytes
 
 LOG = "log.jsonl"
 
 
 def read_log(folder: Path) -> list[dict[str, Any]]:
-    """Return the lines of a log; a line that was cut by a crash is left out."""
+    """Return the lines of a log; a line that was cut by a crash is left out.
+
+    Raises:
+        BadCheckpoint: a whole line is none of ours.
+    """
     path = folder / LOG
-    lines = path.read_text("utf-8").split("\n")[:-1] if path.is_file() else []
-    return [json.loads(line) for line in lines if line]
+    if not path.is_file():
+        return []
+    *lines, _ = path.read_bytes().split(b"\n")
+    return [_parsed(path, number, line) for number, line in enumerate(lines, 1)]
+
+
+def _parsed(path: Path, number: int, line: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(line)
+        if all(is_number(found[name]) for name in ("iteration", "loss")):
+            return found
+    except (ValueError, TypeError, LookupError, RecursionError):
+        pass
+    raise BadCheckpoint(
+        f"{path}: line {number} is damaged; it must hold iteration and loss. Delete "
+        "that line (the network does not depend on it) and run the same command again."
+    )
 
 
 def rewind_log(folder: Path, iteration: int) -> list[dict[str, Any]]:
