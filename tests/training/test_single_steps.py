@@ -11,17 +11,24 @@ from models.samples import Glide, network, pushes
 from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.errors import BadInput, BadStore
+from sainet.errors import BadCheckpoint, BadInput, BadStore
 from sainet.models.card import read_card
-from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.models.dynamics import (
+    LearnedDynamics,
+    PhysicsDynamics,
+    SimulatorAugmented,
+    predict,
+)
+from sainet.models.frame import motion_to_frame, push_frame
 from sainet.models.registry import load_dynamics
 from sainet.models.restarted import Restarted
 from sainet.scene import pack_motion
 from sainet.training.assumed import find_assumed_engine
+from sainet.training.batch import predict_batch
 from sainet.training.config import FitConfig
 from sainet.training.fit import fit
 from sainet.training.single_steps import to_single_steps
-from sainet.training.task import Task, settings
+from sainet.training.task import Task, begin, check_data, settings
 from training.stores import info_of, made_up, quiet_store, write
 
 PLANAR = find_assumed_engine("planar")
@@ -77,15 +84,17 @@ def test_an_engine_without_memory_does_not_mind_to_be_restarted():
     np.testing.assert_allclose(found.pusher_position, wanted.pusher_position, atol=1e-6)
 
 
-def test_training_predicts_a_step_as_the_restarted_model_does():
-    # One step from the start of a push: both forms must say the same.
-    net = network("sain", "robot")
-    scene, initial, controls = pushes("robot", 2, 1)
-    model = Restarted(SimulatorAugmented(net, Glide()))
-    found = pack_motion(predict(model, scene, initial, controls).states)
-    plain = SimulatorAugmented(net, Glide())
-    wanted = pack_motion(predict(plain, scene, initial, controls).states)
-    np.testing.assert_allclose(found, wanted, atol=1e-6)
+@pytest.mark.parametrize("name", ["in", "sain"])
+def test_training_predicts_a_step_as_the_restarted_model_does(quiet, name):
+    # Every step from the true state before it: both forms must say the same.
+    net, inside = network(name, "robot"), engine("planar")
+    steps = to_single_steps(quiet, inside if name == "sain" else None)
+    found = predict_batch(net, steps)[0]
+    plain = SimulatorAugmented(net, inside) if name == "sain" else LearnedDynamics(net)
+    world = steps.scene, steps.initial, steps.controls
+    reached = pack_motion(predict(Restarted(plain), *world).final)
+    wanted = motion_to_frame(reached, push_frame(steps.scene, steps.initial))
+    np.testing.assert_allclose(found, wanted, atol=2e-5)
 
 
 def test_a_restarted_model_forgets_what_came_before():
@@ -136,10 +145,27 @@ def test_what_cannot_be_cut_is_refused(store, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_bullet_cannot_restart_in_a_training(tmp_path):
+@pytest.fixture(scope="module")
+def around_bullet(tmp_path_factory):
     info = info_of(10, assumed_engines=("bullet",))
     arrays = made_up(info)
     arrays["simulated_bullet"] = arrays.pop("simulated_planar")
-    data = write(tmp_path / "data", info, arrays)
+    return write(tmp_path_factory.mktemp("bullet") / "data", info, arrays)
+
+
+def test_bullet_cannot_restart_in_a_training(around_bullet, tmp_path):
     with pytest.raises(BadInput, match="--assumed-engine bullet"):
-        fit("sain", data, CONFIG, tmp_path / "out", assumed_engine="bullet")
+        fit("sain", around_bullet, CONFIG, tmp_path / "out", assumed_engine="bullet")
+
+
+def test_a_network_alone_needs_no_engine_that_restarts(around_bullet):
+    bullet = find_assumed_engine("bullet")
+    task = Task("in", around_bullet, CONFIG, bullet)
+    check_data(task)
+    state, _ = begin(task)
+    assert np.isfinite(state.network.scales.body_deviation).all()
+
+
+def test_a_network_of_single_steps_is_not_put_around_bullet(trained):
+    with pytest.raises(BadCheckpoint, match="recurrent is false.*--engine planar"):
+        load_dynamics(str(trained.folder), engine="bullet", force=True)

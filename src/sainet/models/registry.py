@@ -50,7 +50,7 @@ def load_dynamics(
     Raises:
         UnknownName: neither a model nor a folder has this name.
         BadCheckpoint: the folder holds no network that can be used, or one that was
-            trained around another engine.
+            trained around another engine or cannot work with this one.
         BadInput: identified parameters are damaged, or of another engine.
         MissingExtra: the engine needs a package that is not installed.
     """
@@ -68,9 +68,18 @@ def load_dynamics(
     if card.model == "sain":
         dynamics = SimulatorAugmented(network, _inner_engine(folder, card, engine))
     if not card.recurrent:
-        dynamics = Restarted(dynamics)
+        dynamics = _restarted(folder, dynamics)
     dynamics = with_camera(dynamics, card.assumed or {})
     return NamedDynamics(folder.name, dynamics, card, folder)
+
+
+def _restarted(folder: Path, dynamics: AbstractDynamics) -> AbstractDynamics:
+    if dynamics.on_host:
+        raise BadCheckpoint(
+            f"{folder / CARD}: recurrent is false, and the engine cannot restart at "
+            "every step; give --engine planar, or train it without --no-recurrent."
+        )
+    return Restarted(dynamics)
 
 
 def _identified_physics(folder: Path) -> AbstractDynamics:

@@ -129,9 +129,11 @@ class Task:
         seen = inner.name if inner else None
         batch = to_batch(arrays, info, steps=steps, simulated=seen)
         batch = inner.as_seen(batch) if inner and not inner.is_stored else batch
-        if not self.config.recurrent:
-            return to_single_steps(batch, inner.make() if inner else None)
-        return batch
+        if self.config.recurrent:
+            return batch
+        # IN has statistics of an engine's path too, but no use for what it says of
+        # single steps.
+        return to_single_steps(batch, inner.make() if self.inner else None)
 
 
 def check_data(task: Task) -> None:
