@@ -80,11 +80,12 @@ def _line(value: dict[str, Any]) -> str:
 def _restore_trials(receipts: Path, runs: Path) -> Iterator[Path]:
     for path in sorted((receipts / TRIALS).glob("*.jsonl")):
         to = runs / TRIALS / path.stem
-        if not to.exists():
+        if not (to / SUMMARY).exists():
             made, *records = map(json.loads, path.read_text("utf-8").splitlines())
             files = [episode_file(to, index) for index in range(len(records))]
             for name, value in (*made.items(), *zip(files, records, strict=True)):
-                write_json(to / name, value)
+                if not (to / name).exists():  # what was run here has its pushes too
+                    write_json(to / name, value)
             told = {"episodes": [str(file.relative_to(to)) for file in files]}
             write_json(to / SUMMARY, told)
             yield to
