@@ -1,5 +1,7 @@
 """Whole evaluations of small stores."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -7,12 +9,13 @@ import numpy as np
 import pytest
 
 from models.samples import quick_dynamics
+from sainet.datasets.batch import to_batch
 from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties
-from sainet.errors import BadCheckpoint, BadInput
+from sainet.errors import BadCheckpoint, BadInput, Diverged
 from sainet.evaluation.evaluate import evaluate
 from sainet.models.card import Card
-from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics
+from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.named import NamedDynamics
 from sainet.scene import State, Trajectory
 from training.stores import end_points_alone, info_of, made_up, quiet_store, write
@@ -169,29 +172,69 @@ def test_physics_that_knows_everything_makes_no_error(tmp_path_factory):
         assert getattr(errors["physics"], name).mean() > 100 * tolerance
 
 
+CARD = Card(
+    model="in",
+    kind="robot",
+    time_step=1 / 240,
+    inner_engine=None,
+    truth_engine="planar",
+    assumed=None,
+    data="",
+    data_seed=17,
+    weights="",
+    config={},
+    manifest={},
+)
+
+
 def test_a_network_is_not_used_on_other_pushes_unless_forced(simulated):
-    card = Card(
-        model="in",
-        kind="direct-force",
-        time_step=1 / 240,
-        inner_engine=None,
-        truth_engine="planar",
-        assumed=None,
-        data="",
-        data_seed=0,
-        weights="",
-        config={},
-        manifest={},
-    )
+    card = replace(CARD, kind="direct-force")
     with pytest.raises(BadCheckpoint, match="kind is 'direct-force'"):
         evaluate([resting(card=card)], simulated)
     evaluate([resting(card=card)], simulated, force=True)
 
 
-def test_a_network_can_be_evaluated(simulated):
+def test_recorded_pushes_of_the_training_are_no_test(recorded):
+    card = replace(CARD, data=recorded.content)
+    with pytest.raises(BadCheckpoint, match=r"was trained on them.*--force"):
+        evaluate([resting(card=card)], recorded)
+    evaluate([resting(card=card)], recorded.first(PUSHES - 1))
+
+
+def test_predictions_of_a_network_are_those_of_its_rollout(simulated):
     model = NamedDynamics("in", quick_dynamics("in", "robot"))
-    (row, *_) = evaluate([model], simulated, steps=5).to_dict()["rows"]
-    assert row["pos_mm"] > 0
+    rows = evaluate([model], simulated, steps=5).to_dict()["rows"]
+    arrays = simulated.read(slice(None))
+    batch = to_batch(arrays, simulated.info, steps=5)
+    rolled = predict(model.dynamics, batch.scene, batch.initial, batch.controls)
+    far = np.linalg.norm(
+        rolled.states.position - arrays["truth"][:, :5, :, :2], axis=-1
+    )
+    for row in rows:
+        group = simulated.info.groups.index(row["group"])
+        wanted = 1000 * far[arrays["group"] == group, :, row["body"] - 1].mean()
+        assert row["pos_mm"] == pytest.approx(wanted, rel=1e-3)
+
+
+def test_a_prediction_that_is_not_finite_is_named(simulated):
+    with pytest.raises(Diverged, match=r"^lost: .* push 1 .*test.* not finite"):
+        evaluate([resting("lost", np.nan)], simulated)
+
+
+def test_trainings_are_pooled_into_one_model(simulated):
+    shifts = {"a-0": 0.001, "a-1": 0.003}
+    models = [resting(name, shift) for name, shift in shifts.items()]
+    found = evaluate([resting(), *models, resting("z", 0.002)], simulated)
+    found.pool("a", list(shifts))
+    rows = found.to_dict()["rows"]
+    assert list(dict.fromkeys(row["model"] for row in rows)) == ["rest", "a", "z"]
+    mean, _, _ = np.mean(
+        [errors_at_rest(simulated, 12, shift) for shift in shifts.values()], axis=0
+    )
+    for row in (row for row in rows if row["model"] == "a"):
+        part = mean[("rough", "even").index(row["group"]) :: 2, row["body"] - 1]
+        assert row["pos_mm"] == pytest.approx(part.mean(), rel=1e-3)
+        assert (row["trainings"], row["n"]) == (2, len(part))
 
 
 def test_two_models_of_one_name_are_refused(simulated):

@@ -233,7 +233,7 @@ def test_intervals_of_few_trainings_cover_about_95_times_in_100(trainings):
             held[which].append(bool(low[0] <= 0 <= high[0]))
     of_mean, of_difference = map(np.mean, held)
     assert 0.92 < of_mean < 0.98
-    assert 0.93 < of_difference  # of few trainings, a little wide
+    assert of_difference > 0.93  # of few trainings, a little wide
 
 
 def test_pooled_trainings_are_one_model():

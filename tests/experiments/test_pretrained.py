@@ -49,4 +49,6 @@ def test_small_ones_have_the_cards_of_the_shipped_ones(tiny, chain, tmp_path):
         ]
         assert recipes[0] == recipes[1]
         assert shipped["config"]["iterations"] == iterations[name]
-        load_dynamics(str(tmp_path / "into" / name)).check_fits("robot", 1 / 240, 1)
+        load_dynamics(str(tmp_path / "into" / name)).check_fits(
+            "robot", 1 / 240, seed=1
+        )

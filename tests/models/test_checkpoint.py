@@ -120,6 +120,7 @@ BAD_FIELDS = {
     "weights": ["0" * 64, None],
     "features": ["place", "everything", None],
     "started_from": [3],
+    "earlier_seeds": [3, None, ["0"], [0.5], [True]],
     "residual": ["yes", None, 1],
     "config": [None, []],
     "assumed": [

@@ -29,7 +29,7 @@ def test_shipped_networks_are_loaded_by_name(name):
     assert (model.name, model.card.model) == (name, name)
     assert (model.card.kind, model.card.truth_engine) == ("robot", "bullet")
     assert model.card.config["iterations"] == 10_000
-    model.check_fits("robot", TIME_STEP, 1)
+    model.check_fits("robot", TIME_STEP, seed=1)
 
 
 def test_a_network_keeps_its_engine_unless_it_is_forced(folder):
@@ -64,6 +64,12 @@ def test_pushes_of_the_training_are_no_test(folder):
     model = load_dynamics(str(folder))
     card = re.escape(str(folder / CARD))
     with pytest.raises(BadCheckpoint, match=rf"^{card}: data_seed is 0.*--seed"):
-        model.check_fits("robot", TIME_STEP, 0)
+        model.check_fits("robot", TIME_STEP, seed=0)
+    edit_card(folder, earlier_seeds=[4])
+    model = load_dynamics(str(folder))
+    with pytest.raises(BadCheckpoint, match="data_seed is 4"):
+        model.check_fits("robot", TIME_STEP, seed=4)
+    with pytest.raises(BadCheckpoint, match="was trained on them"):
+        model.check_fits("robot", TIME_STEP, data=model.card.data)
     for seed in (1, None):
-        model.check_fits("robot", TIME_STEP, seed)
+        model.check_fits("robot", TIME_STEP, seed=seed)

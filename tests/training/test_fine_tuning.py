@@ -66,6 +66,7 @@ def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
     fit("sain", store, TUNING, out, start_from=str(start / "sain"))
     card, before = read_card(out), read_card(start / "sain")
     assert card.started_from == before.weights
+    assert (before.data_seeds, card.data_seeds) == ([0], [0])
     assert (card.truth_engine, card.features) == ("recorded", "paper")
     task = Task("sain", store, TUNING, PLANAR, load(start / "sain"))
     first = begin(task)[0].network

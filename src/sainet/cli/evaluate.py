@@ -73,7 +73,7 @@ class Evaluate:
             try:
                 model = load_dynamics(name, engine=self.engine, force=self.force)
                 if not self.force:
-                    model.check_fits(info.kind, info.time_step, info.seed)
+                    model.check_fits(info.kind, info.time_step, seed=info.seed)
                 names.append(name)
             except (BadCheckpoint, MissingExtra) as error:
                 self.output.say(f"Left out: {name}. {error}")

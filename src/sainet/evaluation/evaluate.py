@@ -13,7 +13,7 @@ from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import published_name, simulated_name, variables
 from sainet.datasets.store import Store
 from sainet.devices import over_devices
-from sainet.errors import BadInput
+from sainet.errors import BadInput, Diverged
 from sainet.evaluation.intervals import Folds
 from sainet.evaluation.metrics import (
     REFERENCE_DISTANCE,
@@ -126,16 +126,16 @@ def evaluate(
     Raises:
         BadCheckpoint: a network does not fit the pushes.
         BadInput: two models have the same name.
+        Diverged: a prediction left the finite numbers.
     """
     names = [model.name for model in models]
     if len(set(names)) < len(names):
         raise BadInput(
             f"--model: {', '.join(names)} are not all different; rename one."
         )
-    for model in models:
-        if not force:
-            info = store.info
-            model.check_fits(info.kind, info.time_step, info.seed)
+    info = store.info
+    for model in () if force else models:
+        model.check_fits(info.kind, info.time_step, seed=info.seed, data=store.content)
     arrays = _read(store)
     limit = _limit(store, steps)
     parts = list(_parts_of_one_length(arrays, limit))
@@ -225,7 +225,21 @@ def _predict_all(
             found.append(np.asarray(pose, np.float64)[: len(rows)])
             on_pushes(model.name, len(rows))
         poses.append(np.concatenate(found))
+        _check_finite(model, store, poses[-1], part)
     return poses
+
+
+def _check_finite(
+    model: NamedDynamics, store: Store, poses: np.ndarray, part: np.ndarray
+) -> None:
+    """Raise `Diverged` if a pose is not finite: no mean of the model would be known."""
+    lost = part[~np.isfinite(poses).all(axis=(1, 2, 3))]
+    if len(lost):
+        raise Diverged(
+            f"{model.name}: what it predicts of push {lost[0]} of {store.path} is not "
+            f"finite, nor of {len(lost) - 1} more of {len(part)}; leave it out, or "
+            "train it again."
+        )
 
 
 def _rows(arrays: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:

@@ -11,7 +11,12 @@ from sainet.runs import FORMAT_VERSION, read_json
 CARD = "card.json"
 WEIGHTS = "network.safetensors"
 # Fields that came later: what a card from before, which lacks them, means.
-_LATER = {"recurrent": True, "started_from": None, "residual": False}
+_LATER: dict[str, Any] = {
+    "recurrent": True,
+    "started_from": None,
+    "earlier_seeds": [],
+    "residual": False,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,9 +37,16 @@ class Card:
     final_loss: float | None = None
     features: str = "paper"  # or "place"
     started_from: str | None = None  # hash of the weights that training began with
+    earlier_seeds: list[int] = field(default_factory=list)  # of what that had seen
     recurrent: bool = True  # False: of single steps
     residual: bool = False  # True: its acceleration is added to the inner engine's
     format_version: int = field(default=FORMAT_VERSION)
+
+    @property
+    def data_seeds(self) -> list[int]:
+        """The seeds of all simulated pushes that the network was ever trained on."""
+        own = [] if self.data_seed is None else [self.data_seed]
+        return [*self.earlier_seeds, *own]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the card as JSON values."""

@@ -19,6 +19,10 @@ def _is_positive_list(value: object) -> bool:
     )
 
 
+def _are_seeds(value: object) -> bool:
+    return isinstance(value, list) and all(type(seed) is int for seed in value)
+
+
 def _or_none(check: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: value is None or check(value)
 
@@ -44,6 +48,7 @@ _FIELDS: dict[str, _Check] = {
     "config": (_is(dict), "an object"),
     "manifest": (_is(dict), "an object"),
     "started_from": (_or_none(_is(str)), "a hash or null"),
+    "earlier_seeds": (_are_seeds, "a list of whole numbers"),
     "recurrent": (_is(bool), "true or false"),
     "residual": (_is(bool), "true or false"),
     "final_loss": (_or_none(is_number), "a number or null"),

@@ -19,13 +19,21 @@ class NamedDynamics:
     card: Card | None = None
     folder: Path | None = None  # of what was trained or identified
 
-    def check_fits(self, kind: str, time_step: float, seed: int | None = None) -> None:
+    def check_fits(
+        self,
+        kind: str,
+        time_step: float,
+        *,
+        seed: int | None = None,
+        data: str | None = None,
+    ) -> None:
         """Raise `BadCheckpoint` if the network is not for these pushes.
 
         Args:
             kind: of the pushes.
             time_step: s, of the pushes.
             seed: of simulated pushes that are to test the network; None otherwise.
+            data: hash of the pushes that are to test the network, if any are.
         """
         if self.card is None:
             return
@@ -40,9 +48,15 @@ class NamedDynamics:
                 f"{path}: time_step is {self.card.time_step} s, the data's is "
                 f"{time_step} s; train a network on such data, or give --force."
             )
-        if seed is not None and seed == self.card.data_seed:
+        if seed is not None and seed in self.card.data_seeds:
             raise BadCheckpoint(
-                f"{path}: data_seed is {seed}, and so is the seed of the data: the "
-                "network may have been trained on these very pushes. Generate others "
-                "with another --seed, or give --force."
+                f"{path}: data_seed is {seed} (its own, or that of the network which "
+                "it started from), and so is the seed of the data: the network may "
+                "have been trained on these very pushes. Generate others with another "
+                "--seed, or give --force."
+            )
+        if data is not None and data == self.card.data:
+            raise BadCheckpoint(
+                f"{path}: data is {data[:12]}..., and so are these pushes: the network "
+                "was trained on them. Test it on others, or give --force."
             )

@@ -248,6 +248,7 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         manifest=read_json(folder.path / MANIFEST),
         features=task.config.features,
         started_from=task.start.card.weights if task.start else None,
+        earlier_seeds=task.start.card.data_seeds if task.start else [],
         recurrent=task.config.recurrent,
         residual=progress.network.residual,
         final_loss=history[-1]["loss"] if history else None,
