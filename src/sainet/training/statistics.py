@@ -62,7 +62,7 @@ def feature_scales(
         pair_deviation=pair_deviation,
         body_mean=body_mean,
         body_deviation=body_deviation,
-        # x and y share a scale: a turned frame must not change it.
+        # x and y share a scale: no direction of the frame counts more.
         acceleration=jnp.array([size[:2].mean(), size[:2].mean(), size[2]]),
     )
 
