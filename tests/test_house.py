@@ -113,6 +113,12 @@ def test_every_name_in_all_resolves(name: str):
     assert not missing
 
 
+def test_the_verbs_of_the_method_are_public():
+    verbs = {"generate", "fit", "predict", "evaluate", "identify"}
+    verbs |= {"make_planner", "run_episode", "run_trials"}
+    assert verbs <= set(importlib.import_module("sainet").__all__)
+
+
 def in_a_fresh_python(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Runs code where nothing is imported yet, not even this conftest."""
     command = [sys.executable, "-W", "error", "-c", code, *arguments]

@@ -8,6 +8,7 @@ import sys
 
 import pytest
 
+from sainet import GenerateConfig, generate
 from support import REPOSITORY
 
 README = REPOSITORY / "README.md"
@@ -67,6 +68,16 @@ def test_commands_parse_and_no_two_of_a_page_want_one_folder_for_two_things(page
     folders: dict[str, str] = {}
     for out, asked in filter(lambda pair: pair[0], json.loads(found.stdout)):
         assert folders.setdefault(out, asked) == asked, out
+
+
+def test_the_python_of_the_readme_runs(tmp_path):
+    (code,) = re.findall(r"^```python\n(.*?)^```", README.read_text(), re.M | re.S)
+    small = GenerateConfig(pushes=10, chunk_size=10)
+    generate(small, tmp_path / "runs" / "test")
+    command = [sys.executable, "-W", "error", "-c", code]
+    shown = subprocess.run(command, cwd=tmp_path, capture_output=True, check=False)
+    assert shown.returncode == 0, shown.stderr
+    assert len(shown.stdout.split(b"\n")) > 10
 
 
 def test_every_make_target_of_the_readme_exists():

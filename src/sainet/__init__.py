@@ -13,6 +13,7 @@ _HOMES = {
     "AbstractDynamics": "sainet.models.dynamics",
     "AbstractEngine": "sainet.engines.base",
     "AssumedProperties": "sainet.engines.assumed",
+    "ControlConfig": "sainet.control.config",
     "FitConfig": "sainet.training.config",
     "ForceControls": "sainet.pushes",
     "GenerateConfig": "sainet.datasets.config",
@@ -27,22 +28,33 @@ _HOMES = {
     "evaluate": "sainet.evaluation.evaluate",
     "fit": "sainet.training.fit",
     "generate": "sainet.datasets.generate",
+    "identify": "sainet.identification.identify",
     "load_dynamics": "sainet.models.registry",
+    "make_engine": "sainet.engines",
+    "make_planner": "sainet.planning",
     "open_store": "sainet.datasets.store",
     "predict": "sainet.models.dynamics",
+    "run_episode": "sainet.control.episode",
+    "run_trials": "sainet.control.trials",
 }
 
 if TYPE_CHECKING:
+    from sainet.control.config import ControlConfig
+    from sainet.control.episode import run_episode
+    from sainet.control.trials import run_trials
     from sainet.datasets.config import GenerateConfig
     from sainet.datasets.generate import generate
     from sainet.datasets.store import open_store
+    from sainet.engines import make_engine
     from sainet.engines.assumed import AssumedProperties
     from sainet.engines.base import AbstractEngine
     from sainet.engines.planar.engine import PlanarEngine
     from sainet.evaluation.evaluate import evaluate
+    from sainet.identification.identify import identify
     from sainet.models.dynamics import AbstractDynamics, predict
     from sainet.models.interaction import InteractionNetwork
     from sainet.models.registry import load_dynamics
+    from sainet.planning import make_planner
     from sainet.pushes import ForceControls, PathControls, Push, PushGrid
     from sainet.scene import Scene, State, Trajectory
     from sainet.training.config import FitConfig
@@ -52,6 +64,7 @@ __all__ = [
     "AbstractDynamics",
     "AbstractEngine",
     "AssumedProperties",
+    "ControlConfig",
     "FitConfig",
     "ForceControls",
     "GenerateConfig",
@@ -66,9 +79,14 @@ __all__ = [
     "evaluate",
     "fit",
     "generate",
+    "identify",
     "load_dynamics",
+    "make_engine",
+    "make_planner",
     "open_store",
     "predict",
+    "run_episode",
+    "run_trials",
 ]
 
 
