@@ -21,6 +21,8 @@ from sainet.bench.peer import TorchPeer, missing_torch, run_torch, save_problem
 from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import median_seconds
 from sainet.bench.training import TrainingLoop, counted_gflop
+from sainet.cli.bench import Bench
+from sainet.cli.output import Output
 from sainet.errors import BadInput, SainetError, UnknownName
 from sainet.models.features import Drive, FeatureSizes, Still, in_columns
 from sainet.models.interaction import InteractionNetwork
@@ -208,6 +210,25 @@ def test_an_unknown_case_names_those_there_are():
 def test_a_case_without_runs_is_bad_input(name):
     with pytest.raises(BadInput, match="--runs is 0"):
         load_case(name)(0)
+
+
+def test_figures_of_several_cases_stand_apart(monkeypatch):
+    ran, alone = [], {"bullet_ratio": 2.0}
+
+    def slow_case():
+        ran.append(1)
+        return alone
+
+    monkeypatch.setattr("sainet.cli.bench.use_devices", lambda count: None)
+    for case in ("engines", "planning"):
+        monkeypatch.setattr(f"sainet.bench.{case}.bench_{case}", slow_case)
+    quiet = Output(quiet=True)
+    found = Bench(cases=("engines", "planning"), output=quiet).run()
+    assert found == {"engines": alone, "planning": alone}
+    assert Bench(cases=("planning",), output=quiet).run() == alone
+    with pytest.raises(UnknownName, match="plannin"):
+        Bench(cases=("engines", "plannin"), output=quiet).run()
+    assert len(ran) == 3  # nothing is measured when a name is wrong
 
 
 def test_listing_the_cases_leaves_jax_alone():

@@ -20,16 +20,21 @@ class Bench:
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:
-        """Run the cases one after another; their figures stand side by side."""
+        """Run the cases one after another.
+
+        Returns:
+            The figures of one case; of several, an object of figures for each: some
+            have figures of one name.
+        """
         use_devices(self.devices)
         from sainet.bench import CASES, load_case
 
+        # Every name is looked up before anything is measured.
+        cases = {name: load_case(name) for name in self.cases or tuple(CASES)}
         figures: dict[str, Any] = {}
-        for name in self.cases or tuple(CASES):
-            case = load_case(name)
+        for name, case in cases.items():
             self.output.say(f"Measuring {name} ...")
-            found = case()
-            figures |= found
-            for key, value in found.items():
+            figures[name] = case()
+            for key, value in figures[name].items():
                 self.output.console.print(f"  {key}: {value}")
-        return figures
+        return figures if len(figures) > 1 else next(iter(figures.values()))
