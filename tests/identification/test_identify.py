@@ -102,6 +102,37 @@ def test_what_the_data_cannot_tell_is_said_and_stays(found):
     assert table.value == table.start == pytest.approx(0.15)
 
 
+@pytest.fixture(scope="module")
+def apart(tmp_path_factory):
+    """Pushes of two disks that end before disk 1 comes to disk 2."""
+    config = replace(
+        STROKES,
+        disks=2,
+        pushes=8,
+        chunk_size=8,
+        gap_mm=3.0,
+        stroke_mm=(5.0,),
+        speed_mm_s=(50.0,),
+        noise_level="default",
+    )
+    return generate(config, tmp_path_factory.mktemp("apart") / "data")
+
+
+def test_what_no_push_tells_is_doubted_and_stays(apart):
+    found = {estimate.name: estimate for estimate in identify(apart).estimates}
+    between = found["disk_friction"]
+    assert "too few pushes depend on it" in between.doubt
+    assert between.value == between.start == 0.25
+    assert (between.low, between.high) == (0.01, 2.0)
+    assert not any(found[name].doubt for name in OFFSET)
+
+
+def test_few_pushes_tell_nothing(apart):
+    for estimate in identify(apart.first(3)).estimates:
+        assert "too few pushes depend on it" in estimate.doubt
+        assert estimate.value == estimate.start
+
+
 def test_one_disk_touches_no_other(store):
     scene = samples(store)[0].batch.scene
     assert "disk_friction" not in names_for(scene)

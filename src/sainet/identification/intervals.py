@@ -3,9 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from sainet.identification.parameters import (
+    BOUNDS,
     bounds_of,
     from_coordinate,
     to_coordinate,
@@ -15,7 +16,10 @@ from sainet.identification.residuals import Sample, Scale, residuals, slopes
 _RESAMPLES = 2_000
 _INTERVAL = (2.5, 97.5)  # percent
 _BOOTSTRAP = 0x1DE47
-_RIDGE = 1e-6  # of the largest slope: what the data say nothing of stays where it was
+_RIDGE = 1e-6  # of all curvature; what has less of it than that is not told
+# A resample holds none of k pushes with a probability below e^-k, and then takes no
+# step: from four on these are fewer than either tail of the interval.
+_LEAST_PUSHES = 4
 
 
 def intervals(
@@ -24,7 +28,11 @@ def intervals(
     scale: Scale,
     parts: Sequence[Sample],
 ) -> dict[str, tuple[float, float]]:
-    """Return the 95 % interval of each free parameter, over pushes like these."""
+    """Return the 95 % interval of each free parameter, over pushes like these.
+
+    Of a parameter that fewer than four pushes tell it is all that is looked at: pushes
+    without a slope resample to no step at all, which looks like certainty and is none.
+    """
     at = {name: to_coordinate(name, value) for name, value in values.items()}
     matrices, vectors = [], []
     for part in parts:
@@ -32,13 +40,29 @@ def intervals(
         weight = 1 / np.sqrt(1 + error**2)  # of the soft l1 loss
         matrices.append(np.einsum("pn,pni,pnj->pij", weight, slope, slope))
         vectors.append(np.einsum("pn,pni,pn->pi", weight, slope, error))
-    steps = _resampled_steps(np.concatenate(matrices), np.concatenate(vectors))
+    matrix, vector = np.concatenate(matrices), np.concatenate(vectors)
+    told = _is_told(matrix)
+    if not told.any():  # and a step may have no solution
+        return {name: BOUNDS[name] for name in free}
+    steps = _resampled_steps(matrix, vector)
     draws = np.clip(np.array([at[name] for name in free]) - steps, *bounds_of(free))
-    ends = np.percentile(draws, _INTERVAL, axis=0).tolist()
+    lows, highs = np.percentile(draws, _INTERVAL, axis=0).tolist()
     return {
         name: (from_coordinate(name, low), from_coordinate(name, high))
-        for name, low, high in zip(free, *ends, strict=True)
+        if is_told
+        else BOUNDS[name]
+        for name, low, high, is_told in zip(free, lows, highs, told, strict=True)
     }
+
+
+def _is_told(matrix: Float[np.ndarray, "push p p"]) -> Bool[np.ndarray, " p"]:
+    """Whether pushes tell each parameter, even without the three that tell it best."""
+    curvature = np.sort(np.einsum("pii->pi", matrix), axis=0)
+    return curvature[: 1 - _LEAST_PUSHES].sum(axis=0) > _ridge(matrix)
+
+
+def _ridge(matrix: Float[np.ndarray, "push p p"]) -> float:
+    return _RIDGE * float(np.trace(matrix.sum(axis=0)))
 
 
 def _resampled_steps(
@@ -48,7 +72,6 @@ def _resampled_steps(
     pushes, size = vector.shape
     rng = np.random.default_rng(_BOOTSTRAP)
     counts = rng.multinomial(pushes, np.full(pushes, 1 / pushes), _RESAMPLES)
-    ridge = _RIDGE * np.trace(matrix.sum(axis=0)) * np.eye(size)
-    left = np.einsum("rp,pij->rij", counts, matrix) + ridge
+    left = np.einsum("rp,pij->rij", counts, matrix) + _ridge(matrix) * np.eye(size)
     right = np.einsum("rp,pi->ri", counts, vector)
     return np.linalg.solve(left, right[..., None])[..., 0]

@@ -70,6 +70,8 @@ def doubt(name: str, value: float, low: float, high: float) -> str | None:
         high: its other end.
     """
     least, most = BOUNDS[name]
+    if (low, high) == (least, most):
+        return f"too few pushes depend on it: any of {least:g} to {most:g} may do"
     if value - least < _AT_BOUND * abs(least) or most - value < _AT_BOUND * most:
         return f"it is at the end of what is looked at, {least:g} to {most:g}"
     if high - low > _VAGUE_MM if name in CAMERA else high > _VAGUE * low:
