@@ -72,12 +72,14 @@ def test_what_was_identified_is_said(tmp_path):
 def test_what_hides_beside_a_figure_is_left_out(tmp_path):
     hidden = "<!-- <svg onload='alert(1)'> -->"
     doctype = "<!DOCTYPE svg [<!ENTITY a \"<svg onload='alert(2)'>\">]>"
-    drawn = draw_paths(samples.replay(), tmp_path / "paths.svg")
+    labelled = samples.replay(models=("me@home url(x)",))
+    drawn = draw_paths(labelled, tmp_path / "paths.svg")
     body = drawn.read_text()
     body = body[body.index("<svg") :]
     drawn.write_text(f"{doctype}{hidden}{body}")
     page = page_of(tmp_path)
     assert "alert" not in page
+    assert "me@home url(x)" in page  # a label is text
     assert page.count("<svg") == 1
 
 
@@ -93,7 +95,12 @@ def test_what_hides_beside_a_figure_is_left_out(tmp_path):
         ("episodes/000.json", "{}", "it is no episode"),
         ("paths.svg", "<svg><script>alert(1)</script></svg>", "<script> is nothing"),
         ("paths.svg", "<svg><g onclick='alert(1)'/></svg>", "<g> is nothing"),
+        ("paths.svg", "<svg><g ONCLICK='alert(1)'/></svg>", "<g> is nothing"),
+        ("paths.svg", "<svg ONLOAD='alert(1)'/>", "<svg> is nothing"),
         ("paths.svg", "<svg><use href='https://x.org/a'/></svg>", "<use> is nothing"),
+        ("paths.svg", "<svg><use HREF='https://x.org/a'/></svg>", "<use> is nothing"),
+        ("paths.svg", "<svg><g style='fill: URL(//x.org)'/></svg>", "<g> is nothing"),
+        ("paths.svg", "<svg><style>@import '//x.org'</style></svg>", "<style> is no"),
         ("paths.svg", "<svg>", "cannot be read as a figure"),
     ],
 )

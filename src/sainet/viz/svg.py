@@ -12,6 +12,12 @@ from sainet.viz.palette import css_variables
 _PIXELS_PER_POINT = 1.4
 # What a figure of this package is made of.
 _SHAPES = ("svg", "defs", "style", "g", "path", "use", "text", "clipPath", "rect")
+_ATTRIBUTES = {
+    *("id", "style", "type", "version", "viewBox", "width", "height", "x", "y", "d"),
+    *("transform", "clip-path", "href"),
+}
+# In CSS: what is loaded from elsewhere, and escapes, with which it could be hidden.
+_REFERS_OUTSIDE = re.compile(r"url\(\s*(?!#)|@|\\", re.IGNORECASE)
 _NAMESPACES = {
     "": "http://www.w3.org/2000/svg",
     "xlink": "http://www.w3.org/1999/xlink",
@@ -35,7 +41,9 @@ def read_svg(path: Path) -> str:
         figure.remove(about)
     for part in figure.iter():
         name = part.tag.rpartition("}")[2]
-        if name not in _SHAPES or not all(map(_is_plain, part.attrib.items())):
+        rules = part.text or "" if name == "style" else ""
+        plain = all(map(_is_plain, part.attrib.items()))
+        if name not in _SHAPES or not plain or _REFERS_OUTSIDE.search(rules):
             raise BadInput(
                 f"{path}: <{name}> is nothing that sainet draws; delete the file or "
                 "take it out of the folder."
@@ -48,7 +56,9 @@ def read_svg(path: Path) -> str:
 def _is_plain(attribute: tuple[str, str]) -> bool:
     """Whether an attribute does nothing and refers to nothing outside."""
     name, value = attribute[0].rpartition("}")[2], attribute[1]
-    return not name.startswith("on") and (name != "href" or value.startswith("#"))
+    if name not in _ATTRIBUTES or (name == "href" and not value.startswith("#")):
+        return False
+    return not _REFERS_OUTSIDE.search(value)
 
 
 def inline_svg(text: str, number: int) -> Markup:
