@@ -21,6 +21,7 @@ from sainet.identification.parameters import (
     doubt,
     from_coordinate,
     names_for,
+    starting_values,
     to_coordinate,
     with_values,
 )
@@ -246,6 +247,28 @@ def test_pushes_that_nothing_can_be_learned_from_are_refused(tmp_path):
     blind = arrays | {"pose_observed": 0 * arrays["pose_observed"]}
     with pytest.raises(BadStore, match="no pose was observed"):
         identify(write(tmp_path / "blind", info, blind))
+
+
+def test_pushes_of_all_lengths_and_looks_count_alike(tmp_path, caplog):
+    """Of the short ones the end alone was seen, of the long ones every step."""
+    info = info_of(8, bodies=1)
+    arrays = made_up(info, lengths=[8] * 4 + [12] * 4)
+    arrays["pose_observed"][:4, :7] = False
+    arrays["table_friction"] = np.repeat([0.1, 0.3], 4)
+    found = identify(write(tmp_path / "data", info, arrays))
+    (table,) = [e for e in found.estimates if e.name == "table_friction"]
+    assert table.start == pytest.approx(0.2)
+    assert "table_friction differs from push to push, 0.1 to 0.3" in caplog.text
+    assert caplog.text.count("differs") == 1
+    assert found.pushes == 8
+    assert found.before_mm > 0
+
+
+def test_alike_frictions_are_the_start_to_the_bit():
+    friction = jnp.full(256, 0.15, jnp.float32)  # whose mean rounds to another number
+    scenes = [eqx.tree_at(lambda s: s.table_friction, samples_scene(), friction)]
+    one, more = (starting_values(scenes * n, ("table_friction",)) for n in (1, 3))
+    assert one == more == {"table_friction": float(jnp.mean(friction))}
 
 
 def test_a_group_that_is_not_there_lists_those_that_are(tmp_path):

@@ -1,5 +1,6 @@
 """Fit the planar engine's parameters to observed pushes, by gradient through it."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -27,6 +28,8 @@ from sainet.identification.residuals import (
 )
 from sainet.identification.solve import Try, solve
 from sainet.runs import open_run, read_json, write_json
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,9 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
     parts = samples(store)
     if not parts:
         raise BadStore(f"{store.path}: no pose was observed; there is nothing to fit.")
-    scene = parts[0].batch.scene
-    start = starting_values(scene, names_for(scene))
+    scenes = [part.batch.scene for part in parts]
+    start = starting_values(scenes, names_for(scenes[0]))
+    _tell_of_one_value(store, start)
     before, scale = _mean_errors(start, parts), _scale(start, parts)
     values, known, doubtful = start, {}, {}
     while len(doubtful) < len(start):
@@ -131,6 +135,16 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
         before_deg=before[1],
         after_deg=after[1],
     )
+
+
+def _tell_of_one_value(store: Store, start: Mapping[str, float]) -> None:
+    for name, values in store.read(slice(None), FRICTIONS).items():
+        if name in start and np.ptp(values) > 0:
+            _log.warning(
+                "%s: %s differs from push to push, %.3g to %.3g; one value of it takes "
+                "their place, and their mean if the pushes cannot tell one.",
+                *(store.path, name, values.min(), values.max()),
+            )
 
 
 def _estimate(
@@ -160,6 +174,11 @@ def _mean_errors(
     values: Mapping[str, float], parts: Sequence[Sample]
 ) -> tuple[float, float]:
     """Return mean errors (mm, degrees) over pushes, where they were observed."""
-    errors = np.concatenate([_raw_errors(values, part) for part in parts])
-    place = np.linalg.norm(errors[..., :2], axis=-1)
-    return 1000 * float(place.mean()), float(np.rad2deg(np.abs(errors[..., 2]).mean()))
+    errors = [_raw_errors(values, part) for part in parts]
+    # Over each push first: of some more poses are looked at than of others.
+    place = [np.linalg.norm(e[..., :2], axis=-1).mean(axis=(1, 2)) for e in errors]
+    turn = [np.abs(e[..., 2]).mean(axis=(1, 2)) for e in errors]
+    return (
+        1000 * float(np.concatenate(place).mean()),
+        float(np.rad2deg(np.concatenate(turn).mean())),
+    )

@@ -85,11 +85,20 @@ def names_for(scene: Scene) -> tuple[str, ...]:
     return tuple(name for name in NAMES if not (lone and name == "disk_friction"))
 
 
-def starting_values(scene: Scene, names: tuple[str, ...]) -> dict[str, float]:
-    """Return what the scenes say, on average."""
-    known = {name: float(jnp.mean(getattr(scene, name))) for name in FRICTIONS}
+def starting_values(
+    scenes: Sequence[Scene], names: tuple[str, ...]
+) -> dict[str, float]:
+    """Return what all scenes say, on average."""
+    known = {name: _mean([getattr(one, name) for one in scenes]) for name in FRICTIONS}
     known |= {RATIO: USUAL_RATIO, **dict.fromkeys(CAMERA, 0.0)}
     return {name: known[name] for name in names}
+
+
+def _mean(parts: Sequence[Float[Array, " push"]]) -> float:
+    # The rounding of a mean in single precision depends on how many there are. What
+    # pushes that are all alike were identified from must not: theirs is the first's.
+    first, every = np.float64(parts[0]), np.float64(np.concatenate(parts))
+    return float(jnp.mean(parts[0])) + float(every.mean() - first.mean())
 
 
 def with_values(
