@@ -2,11 +2,13 @@
 
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, final
 
 from sainet.errors import BadInput
 
@@ -20,13 +22,25 @@ def core_count() -> int:
 def worker_pool(workers: int | None) -> Iterator[Executor]:
     """Give a pool of processes, as many as there are cores by default.
 
+    Ctrl-C reaches the jobs under way as `KeyboardInterrupt`, so that they may keep what
+    they have; none begins after it.
+
     Raises:
         BadInput: fewer than one worker.
     """
     if workers is not None and workers < 1:
         raise BadInput(f"--workers is {workers}; it must be at least 1.")
-    with spawned_pool(workers or core_count()) as pool:
-        yield pool
+    pool = spawned_pool(workers or core_count())
+    try:
+        yield _InterruptibleExecutor(pool)
+    except KeyboardInterrupt:
+        # A terminal tells every process; whoever signals this one alone does not.
+        for process in multiprocessing.active_children():
+            if process.pid is not None:
+                os.kill(process.pid, signal.SIGINT)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def spawned_pool(workers: int) -> ProcessPoolExecutor:
@@ -35,7 +49,66 @@ def spawned_pool(workers: int) -> ProcessPoolExecutor:
     Spawned, not forked: a process that is forked after JAX has started hangs.
     """
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=end_with_parent)
+    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+
+
+@final
+class _InterruptibleExecutor(Executor):
+    """Does jobs in a pool of processes that an interruption ends."""
+
+    def __init__(self, pool: ProcessPoolExecutor) -> None:
+        self._pool = pool
+
+    def submit(
+        self,
+        work: Callable[..., Any],
+        /,
+        *arguments: Any,  # noqa: ANN401
+        **named: Any,  # noqa: ANN401
+    ) -> Future[Any]:
+        """Have a job done."""
+        return self._pool.submit(_do, work, *arguments, **named)
+
+
+@dataclass
+class _WorkerState:
+    """What a signal finds this worker at."""
+
+    is_busy: bool = False
+    is_interrupted: bool = False
+
+
+_worker = _WorkerState()  # one a process, as signal handlers are
+
+
+def _begin_worker() -> None:
+    end_with_parent()
+    # A shell has its background jobs ignore the signal; so do their workers.
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _interrupt)
+
+
+def _interrupt(number: int, frame: object) -> None:
+    """End the job under way, once: a second signal finds it keeping what it has.
+
+    An idle worker stays: to the pool its end would be a failure, for which the pool
+    kills the others.
+    """
+    is_first = not _worker.is_interrupted
+    _worker.is_interrupted = True
+    if is_first and _worker.is_busy:
+        raise KeyboardInterrupt
+
+
+def _do(work: Callable[..., Any], *arguments: Any, **named: Any) -> Any:  # noqa: ANN401
+    """Do a job, unless this worker was interrupted: more may be waiting for it."""
+    _worker.is_busy = True
+    try:
+        if _worker.is_interrupted:
+            raise KeyboardInterrupt
+        return work(*arguments, **named)
+    finally:
+        _worker.is_busy = False
 
 
 def each_done(

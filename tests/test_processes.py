@@ -1,0 +1,71 @@
+"""Workers that are interrupted, and how many there are by default."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+# Jobs that write where they began and, when they are interrupted, what they keep.
+JOBS = """
+import pathlib, signal, sys, time
+from sainet.processes import each_done, worker_pool
+
+def work(folder, index):
+    try:
+        (folder / f"began-{index}").touch()
+        time.sleep(0.3 if index < 0 else 60)
+    except KeyboardInterrupt:
+        time.sleep(0.3)  # a second signal comes meanwhile
+        (folder / f"kept-{index}").touch()
+        raise
+    return index
+
+if __name__ == "__main__":
+    # A shell has its background jobs ignore the signal, and children inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    folder, jobs = pathlib.Path(sys.argv[1]), int(sys.argv[2])
+    try:
+        with worker_pool(2) as pool:
+            list(each_done(pool, work, [(folder, -1), (folder, -2)]))
+            list(each_done(pool, work, [(folder, index) for index in range(jobs)]))
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+def wait_for(folder: Path, pattern: str, count: int):
+    end = time.monotonic() + 60
+    while len(list(folder.glob(pattern))) < count:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("whole_group", [True, False])
+@pytest.mark.parametrize("jobs", [1, 5])  # a worker is idle; jobs are waiting
+def test_an_interruption_is_quiet_ends_what_is_under_way_and_begins_no_more(
+    jobs, whole_group, tmp_path
+):
+    script = tmp_path / "jobs.py"
+    script.write_text(JOBS)
+    child = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path), str(jobs)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    under_way = min(jobs, 2)
+    wait_for(tmp_path, "began-[0-9]", under_way)
+    # A terminal signals every process, `kill -INT` one.
+    (os.killpg if whole_group else os.kill)(child.pid, signal.SIGINT)
+    try:
+        said, complaints = child.communicate(timeout=30)
+    finally:
+        child.kill()
+    assert (said, complaints, child.returncode) == ("interrupted\n", "", 0)
+    assert len(list(tmp_path.glob("began-[0-9]"))) == under_way
+    assert len(list(tmp_path.glob("kept-[0-9]"))) == under_way
