@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from sainet.processes import core_count
+
 # Jobs that write where they began and, when they are interrupted, what they keep.
 JOBS = """
 import pathlib, signal, sys, time
@@ -69,3 +71,9 @@ def test_an_interruption_is_quiet_ends_what_is_under_way_and_begins_no_more(
     assert (said, complaints, child.returncode) == ("interrupted\n", "", 0)
     assert len(list(tmp_path.glob("began-[0-9]"))) == under_way
     assert len(list(tmp_path.glob("kept-[0-9]"))) == under_way
+
+
+def test_cores_are_counted_where_affinity_is_unknown(monkeypatch):
+    assert 1 <= core_count() <= (os.cpu_count() or 1)
+    monkeypatch.delattr(os, "sched_getaffinity")
+    assert core_count() == os.cpu_count()
