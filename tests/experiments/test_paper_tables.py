@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sainet.datasets.store import open_store
+from sainet.experiments.data_efficiency import IN_FULL
 from sainet.experiments.paper_setup import AROUND, NETWORKS
 from sainet.experiments.published import DIRECT_FORCE_THREE_DISKS, published_rows
 from sainet.experiments.regularisation import score
@@ -43,6 +44,10 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
     assert three["published"] == published_rows(DIRECT_FORCE_THREE_DISKS)
     kept = read_json(tmp_path / "direct-force-three-disks" / "table.json")
     assert kept["rows"] == three["rows"]
+    made_by = read_json(tmp_path / "direct-force-three-disks" / "config.json")
+    assert made_by["experiment"] == "direct-force-three-disks"
+    versions = read_json(tmp_path / "direct-force-three-disks" / "manifest.json")
+    assert versions["versions"]["jax"]
     engines = {
         read_json(path)["model"] + " " + str(read_json(path)["inner_engine"])
         for path in made
@@ -54,7 +59,7 @@ def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
     models = PHYSICS | {"in"}
     efficiency = make("data-efficiency")
     assert rows_of(efficiency) == {
-        (group, m, b) for group in ("3", "6") for m in models for b in (1, 2)
+        (group, m, b) for group in ("3", "6", IN_FULL) for m in models for b in (1, 2)
     }
     assert (tmp_path / "data-efficiency" / "data-efficiency.svg").is_file()
     forms = make("recurrent-or-not")
@@ -68,7 +73,8 @@ def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
     assert len(groups) == 8
     assert groups >= {"as trained", "properties ±10 %", "angles outside", "2 mm apart"}
     assert {path.parent.name for path in cards(tmp_path)} == {
-        f"in{form}-seed-0" for form in ("", "-3-pushes", "-single-steps", "-l2-0.0001")
+        f"in{form}-seed-0"
+        for form in ("", "-3-pushes", "-6-pushes", "-single-steps", "-l2-0.0001")
     }
     check_test_sets(tmp_path / "robot-quick")
 

@@ -5,6 +5,7 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
@@ -13,9 +14,11 @@ from sainet.errors import BadInput
 from sainet.evaluation.evaluate import Evaluation, evaluate
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import PHYSICS, load_dynamics
+from sainet.runs import CONFIG, MANIFEST, manifest, write_json
 from sainet.training.config import FitConfig, ModelKind
 from sainet.training.fit import FitResult, fit
 
+TABLE = "table.json"
 Advance = Callable[[int, str], None]
 Bar = Callable[[str, int], AbstractContextManager[Advance]]
 
@@ -131,6 +134,15 @@ class Chain:
                 steps=steps,
                 on_pushes=lambda model, pushes: advance(pushes, model),
             )
+
+    def finish(self, table: dict[str, Any]) -> dict[str, Any]:
+        """Write the table, and beside it by what it was made; returns it."""
+        recorded = self.recorded and open_store(self.recorded).content
+        made = {"command": "reproduce", "experiment": self.out.name}
+        write_json(self.out / CONFIG, made | {"recorded": recorded})
+        write_json(self.out / MANIFEST, manifest())
+        write_json(self.out / TABLE, table)
+        return table
 
     def models(
         self, networks: Sequence[str] = ("in", "sain"), *, engine: str = "planar"

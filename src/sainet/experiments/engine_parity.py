@@ -20,7 +20,6 @@ from sainet.geometry import rotate
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.named import NamedDynamics
 from sainet.pushes import Controls, PathControls
-from sainet.runs import write_json
 from sainet.scene import Scene, State, Trajectory
 
 PUSHES = 200
@@ -82,8 +81,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         store = chain.simulate(setup, config)
         for row in chain.compare(_engines(), store).to_dict()["rows"]:
             table["rows"].append(row | {"group": setup})
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)
 
 
 def _engines() -> list[NamedDynamics]:

@@ -13,7 +13,6 @@ from sainet.experiments.few_pushes import recipe
 from sainet.experiments.paper_setup import join
 from sainet.experiments.stand_in import ROBOTS, Robot, recordings
 from sainet.models.registry import load_dynamics
-from sainet.runs import write_json
 from sainet.training.config import FROM_ENGINE
 
 Change = dict[str, Any]
@@ -70,8 +69,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
                 }
             )
     table = join(tables) | {"choices": choices}
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)
 
 
 @dataclass(frozen=True)

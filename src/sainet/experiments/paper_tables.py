@@ -19,7 +19,6 @@ from sainet.experiments.published import (
     ROBOT_TWO_DISKS,
     published_rows,
 )
-from sainet.runs import write_json
 
 SEEDS = {"quick": range(1), "paper": range(5)}  # trainings of each network
 
@@ -65,5 +64,4 @@ def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
     trainings = {name: setup.train(name, SEEDS[scale]) for name in NETWORKS}
     result = setup.compare(trainings, tests)
     result["published"] = published_rows(table.published)
-    write_json(chain.out / "table.json", result)
-    return result
+    return chain.finish(result)

@@ -16,7 +16,6 @@ from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import join
 from sainet.experiments.recorded_models import Tuner, Variant, surfaces_of
 from sainet.experiments.recorded_pushes import FOLDS, told
-from sainet.runs import write_json
 from sainet.viz.efficiency import draw_data_efficiency
 
 PUSHES = {"quick": (10, 20), "paper": (25, 50, 100, 200, 400)}
@@ -51,7 +50,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         tables.append(told(replace(whole, groups=groups)))
     table = join(tables)
     table["published"] = [row for one in tables for row in one["published"]]
-    write_json(chain.out / "table.json", table)
+    chain.finish(table)
     draw_data_efficiency(table, chain.out / "recorded-data-efficiency.svg")
     return table
 

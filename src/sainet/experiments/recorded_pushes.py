@@ -28,7 +28,6 @@ from sainet.experiments.recorded_models import (
     Variant,
     surfaces_of,
 )
-from sainet.runs import write_json
 from sainet.training.config import Features, ModelKind
 from sainet.viz.engine_errors import draw_engine_errors
 
@@ -93,7 +92,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     tables = [*_tables(whole, store), *_elsewhere(store, scale, chain)]
     table = join(tables)
     table["published"] = [row for one in tables for row in one.get("published", ())]
-    write_json(chain.out / "table.json", table)
+    chain.finish(table)
     cases = dict(_engine_errors(store, scale, chain))
     draw_engine_errors(cases, chain.out / "engine-errors.svg")
     return table

@@ -9,7 +9,6 @@ from typing import Any
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import paper_setup
-from sainet.runs import write_json
 
 SEEDS = {"quick": range(1), "paper": range(3)}
 NETWORKS = ("in", "sain")
@@ -25,5 +24,4 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
             name, SEEDS[scale], form=SINGLE, recurrent=False
         )
     table = setup.compare(trainings, setup.test_pushes())
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)

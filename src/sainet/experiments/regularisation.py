@@ -8,7 +8,6 @@ import numpy as np
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import join, paper_setup
-from sainet.runs import write_json
 from sainet.training.config import FitConfig
 
 CHOICES = (1e-3, 1e-4, 1e-6)
@@ -36,8 +35,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         choices.append({"l2": l2, "score": score(table)})
         tables.append(table)
     table = join(tables) | {"choices": choices}
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)
 
 
 def score(table: Mapping[str, Any]) -> float:

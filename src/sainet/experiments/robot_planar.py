@@ -9,7 +9,6 @@ from sainet.datasets.config import GenerateConfig
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.published import ROBOT_TWO_DISKS, published_rows
-from sainet.runs import write_json
 from sainet.training.config import FitConfig, ModelKind
 
 _SIZES = {"quick": (1000, 200, 500), "paper": (4500, 500, 10_000)}
@@ -35,5 +34,4 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     }
     table = chain.compare_trainings(trainings, test).to_dict()
     table["published"] = published_rows(ROBOT_TWO_DISKS)
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)

@@ -13,7 +13,6 @@ from sainet.experiments.config import Scale
 from sainet.experiments.paper_setup import NETWORKS, PaperSetup, join, paper_setup
 from sainet.experiments.paper_tables import SEEDS
 from sainet.geometry import wrap_angle
-from sainet.runs import write_json
 
 PERCENT_WRONG = (2, 5, 10)
 SPEEDS_MM_S = (25.0, 100.0)
@@ -33,8 +32,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
             for group, tests in _test_sets(setup)
         ]
     )
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)
 
 
 def _test_sets(setup: PaperSetup) -> Iterator[tuple[str, Store]]:

@@ -8,11 +8,11 @@ from sainet.control.record import read_record
 from sainet.control.trials import FOLDER
 from sainet.engines.identified import FILE as IDENTIFIED
 from sainet.errors import BadInput
+from sainet.experiments.chain import TABLE
 from sainet.models.card import CARD, read_card
 from sainet.runs import CONFIG, MANIFEST, read_json
 from sainet.viz.report import REPORT, Report, to_page
 
-TABLE = "table.json"
 _EPISODES = 6  # that play
 # The figures that commands leave in their folders, and what one sees there.
 _FIGURES = {
@@ -20,7 +20,7 @@ _FIGURES = {
     "paths": "Predicted paths of one push against the true one.",
     "error-over-time": "Mean position error of each disk over the time of a push.",
     "episodes": "Shapes at the start (faint) and at the end, and the goal.",
-    "data-efficiency": "Errors over training pushes.",
+    "data-efficiency": "Errors over training pushes, as many iterations for all.",
     "recorded-data-efficiency": "Errors over recorded training pushes.",
     "engine-errors": "What engines miss of the end of a push: by place and direction.",
 }

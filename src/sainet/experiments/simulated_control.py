@@ -16,7 +16,6 @@ from sainet.control.trials import run_trials
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.published import SIMULATED_CONTROL
-from sainet.runs import write_json
 
 TRIALS = {"quick": 4, "paper": 100}
 MODELS = ("physics", "physics-calibrated", "in", "sain")
@@ -55,8 +54,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
             for one, other in combinations(MODELS, 2)
         ]
     table = {"rows": rows, "pairs": pairs, "published": list(SIMULATED_CONTROL)}
-    write_json(chain.out / "table.json", table)
-    return table
+    return chain.finish(table)
 
 
 def groups(trials: int) -> Iterator[Group]:
