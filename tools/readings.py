@@ -8,6 +8,7 @@ from sainet.viz.palette import styles_of
 
 _PHYSICS, _CALIBRATED, _ALONE = "physics", "physics-calibrated", "in"
 _ERRORS = {"pos_mm": "pos", "rot_deg": "rot"}
+_PUBLISHED = ("physics", "in", "sain-bullet")  # the paper's rows, as we name them
 
 Row = Mapping[str, Any]
 
@@ -25,16 +26,12 @@ def of_control(table: Mapping[str, Any]) -> str:
         solved.setdefault(row["group"], []).append(told)
     level = "; ".join(group for group in solved if group not in differing)
     apart = [
-        f"They do in *{group}*{_why(group)}: {'; '.join(solved[group])}."
+        f"They differ in *{group}*{_why(group)}: {'; '.join(solved[group])}."
         for group in solved
         if group in differing
     ]
-    return " ".join(
-        [
-            f"No two models differ (p < {CHANCE:g}) in what they solve in: {level}.",
-            *apart,
-        ]
-    )
+    told = f"No two models differ (p < {CHANCE:g}) in what they solve in: {level}."
+    return " ".join([*([told] if level else []), *apart])
 
 
 def _why(group: str) -> str:
@@ -49,39 +46,113 @@ def of_errors(table: Mapping[str, Any]) -> str:
     Args:
         table: of one group of pushes, with the paper's numbers (`published`).
     """
+    rows, comparisons = table["rows"], table["comparisons"]
     lines = ["| Error over that of Physics | pos | rot |", "| :-- | --: | --: |"]
-    lines += _ratios(table["rows"], "{}")
+    lines += _ratios(rows, "{}")
     lines += _ratios(table["published"], "*{}, published*")
-    sains = [name for name in _models(table["rows"]) if name.startswith("sain")]
-    against = [
-        f"{_label(name)} is {_verdict(table['comparisons'], name, _CALIBRATED)}"
-        for name in sains
+    sains = [name for name in _models(rows) if name.startswith("sain")]
+    verdicts = [
+        f"Against {_label(against)}, {_verdicts(comparisons, sains, against)}."
+        for against in (_CALIBRATED, _ALONE)
     ]
-    alone = [
-        f"{_label(name)} is {_verdict(table['comparisons'], name, _ALONE)}"
-        for name in sains
+    parts = [
+        "\n".join(lines),
+        _beside_the_paper(table),
+        f"Calibrate or learn? {verdicts[0]} {_worth(rows)}",
+        verdicts[1],
+        _chance(comparisons),
     ]
-    said = (
-        f"Calibrate or learn? Against {_label(_CALIBRATED)} (the 95 % interval of the "
-        f"paired difference leaves out 0), {'; '.join(against)}. {_worth(table)}"
+    return "\n\n".join(parts)
+
+
+def of_groups(
+    table: Mapping[str, Any], against: Mapping[str, Sequence[str]] | None = None
+) -> str:
+    """Set errors of several groups of pushes in relation to physics and each other.
+
+    Args:
+        table: of the errors.
+        against: the models that each model is compared with; by default every SAIN
+            with physics-calibrated and IN.
+    """
+    rows, comparisons = table["rows"], table["comparisons"]
+    models = [name for name in _models(rows) if name != _PHYSICS]
+    if against is None:
+        sains = [name for name in models if name.startswith("sain")]
+        against = dict.fromkeys(sains, (_CALIBRATED, _ALONE))
+    groups = list(dict.fromkeys(row["group"] for row in rows))
+    parts = [
+        _ratios_by_group(rows, groups, models, key, name)
+        for key, name in (("pos_mm", "Position"), ("rot_deg", "Rotation"))
+    ]
+    said = [
+        f"- {f'*{group}*: ' if group else ''}{_label(model)} against {_label(other)}: "
+        f"{_verdict(_of_group(comparisons, group), model, other)}."
+        for group in groups
+        for model, others in against.items()
+        for other in others
+    ]
+    return "\n\n".join([*parts, "\n".join(said), _chance(comparisons)])
+
+
+def _ratios_by_group(
+    rows: Sequence[Row],
+    groups: Sequence[str | None],
+    models: Sequence[str],
+    key: str,
+    name: str,
+) -> str:
+    """Return a table of errors over those of physics: a line for each group."""
+    labels = " | ".join(map(_label, models))
+    lines = [f"| {name} error over that of Physics | {labels} |"]
+    lines.append("| :-- |" + " --: |" * len(models))
+    for group in groups:
+        part = _of_group(rows, group)
+        cells = [_slashed(_over_physics(part, model, key)) for model in models]
+        lines.append(f"| {group or 'all'} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _beside_the_paper(table: Mapping[str, Any]) -> str:
+    """Say how our errors stand to the published ones, and whether the order holds."""
+    rows, published = table["rows"], table["published"]
+    ours = [name for name in _PUBLISHED if name in _models(rows)]
+    theirs = {name: name.removesuffix("-bullet") for name in ours}
+    shares = []
+    for name in ours:
+        ratios = {k: _over(rows, name, published, theirs[name], k) for k in _ERRORS}
+        told = ", ".join(f"{_ERRORS[k]} {_slashed(v)}" for k, v in ratios.items())
+        shares.append(f"{_label(name)} {told}")
+    broken = [
+        f"{_ERRORS[key]} of disk {body + 1}"
+        for key in _ERRORS
+        for body, errors in enumerate(
+            zip(*(_errors(rows, name, key) for name in ours), strict=True)
+        )
+        if list(errors) != sorted(errors, reverse=True)
+    ]
+    order = ", ".join(_label(name) for name in reversed(ours))
+    holds = f"does not hold in {', '.join(broken)}" if broken else "holds everywhere"
+    return (
+        f"Errors here over the published ones: {'; '.join(shares)}. The paper's order "
+        f"of means ({order}, from small to large) {holds}."
     )
-    return "\n".join([*lines, "", said, "", f"Against IN, {'; '.join(alone)}."])
 
 
-def _worth(table: Mapping[str, Any]) -> str:
+def _worth(rows: Sequence[Row]) -> str:
     """Say what is left of physics' position error by knowing, learning, and both."""
-    rows = table["rows"]
     left = {
-        "true masses and radii alone leave": _CALIBRATED,
-        "learning around wrong ones leaves": "sain",
-        "learning around true ones leaves": "sain-calibrated",
+        "true masses and radii in Bullet leave": _CALIBRATED,
+        "learning around Bullet with wrong ones leaves": "sain-bullet",
+        "learning around planar with wrong ones leaves": "sain",
+        "learning around planar with true ones leaves": "sain-calibrated",
     }
     parts = [
         f"{words} {_slashed(_over_physics(rows, name, 'pos_mm'))}"
         for words, name in left.items()
         if name in _models(rows)
     ]
-    return f"Of the position error of Physics, {', '.join(parts)}."
+    return f"Of the position error of Physics (Bullet), {', '.join(parts)}."
 
 
 def _ratios(rows: Sequence[Row], form: str) -> list[str]:
@@ -94,11 +165,31 @@ def _ratios(rows: Sequence[Row], form: str) -> list[str]:
     ]
 
 
-def _over_physics(rows: Iterable[Row], model: str, key: str) -> list[float]:
-    """Return a model's errors over those of physics, disk by disk."""
-    errors = {(row["model"], row["body"]): row[key] for row in rows}
-    bodies = sorted(body for name, body in errors if name == _PHYSICS)
-    return [errors[model, body] / errors[_PHYSICS, body] for body in bodies]
+def _over_physics(rows: Sequence[Row], model: str, key: str) -> list[float]:
+    return _over(rows, model, rows, _PHYSICS, key)
+
+
+def _over(
+    rows: Sequence[Row], model: str, others: Sequence[Row], other: str, key: str
+) -> list[float]:
+    """Return a model's errors over those of another, disk by disk."""
+    pairs = zip(_errors(rows, model, key), _errors(others, other, key), strict=True)
+    return [one / two for one, two in pairs]
+
+
+def _errors(rows: Iterable[Row], model: str, key: str) -> list[float]:
+    found = {row["body"]: row[key] for row in rows if row["model"] == model}
+    return [found[body] for body in sorted(found)]
+
+
+def _of_group(rows: Iterable[Row], group: str | None) -> list[Row]:
+    return [row for row in rows if row["group"] == group]
+
+
+def _verdicts(comparisons: Sequence[Row], models: Iterable[str], against: str) -> str:
+    return "; ".join(
+        f"{_label(name)} is {_verdict(comparisons, name, against)}" for name in models
+    )
 
 
 def _verdict(comparisons: Iterable[Row], model: str, against: str) -> str:
@@ -117,6 +208,15 @@ def _verdict(comparisons: Iterable[Row], model: str, against: str) -> str:
             found["worse"].append(place)
     told = [f"{word} in {', '.join(where)}" for word, where in found.items() if where]
     return " and ".join(told) or "neither better nor worse"
+
+
+def _chance(comparisons: Iterable[Row]) -> str:
+    count = sum(pair["metric"] in _ERRORS for pair in comparisons)
+    return (
+        "Better and worse: the 95 % interval of the paired difference leaves out 0. "
+        "Where models do not differ, one in twenty does so by chance, and this table "
+        f"has {count}."
+    )
 
 
 def _models(rows: Iterable[Row]) -> list[str]:
