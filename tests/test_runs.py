@@ -80,7 +80,11 @@ def test_equal_values_are_equal_bytes(tmp_path):
     assert content_hash(b"a") != content_hash(b"b")
 
 
-@pytest.mark.parametrize("data", [b"", b"{", b"[1]", b"3", b"\xff\xfe\x00", b"null"])
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"{", b"[1]", b"3", b"\xff\xfe\x00", b"null", b"[" * 100_000],
+    ids=lambda data: repr(data[:9]),
+)
 def test_what_is_no_json_object_is_refused_by_name(tmp_path, data):
     (tmp_path / "x.json").write_bytes(data)
     with pytest.raises(
@@ -146,6 +150,20 @@ def test_a_run_killed_as_it_began_goes_on(tmp_path):
     (tmp_path / "manifest.json").write_text("{}")
     open_here(tmp_path)
     assert files(tmp_path).keys() == {"config.json", "manifest.json"}
+
+
+def test_the_folder_of_an_import_into_this_one_stays(tmp_path):
+    (tmp_path / ".mit.0.partial").mkdir()
+    open_here(tmp_path)
+    open_here(tmp_path)
+    assert (tmp_path / ".mit.0.partial").is_dir()
+
+
+def test_a_name_that_no_folder_can_have_is_one_line(tmp_path):
+    path = tmp_path / ("x" * 300)
+    with pytest.raises(RunConflict, match="cannot be read .*; choose another") as told:
+        open_here(path)
+    assert "\n" not in str(told.value)
 
 
 def test_an_empty_folder_is_used(tmp_path):

@@ -73,6 +73,21 @@ def write_json(path: Path, value: object) -> None:
     write_bytes(path, to_json(value).encode())
 
 
+@contextmanager
+def readable(path: Path, error: type[BadInput] = BadInput) -> Iterator[None]:
+    """Say in one line why a path that is looked at cannot be.
+
+    Raises:
+        BadInput: or the given subclass; the name is too long, say.
+    """
+    try:
+        yield
+    except OSError as cause:
+        raise error(
+            f"{path}: cannot be read ({cause.strerror}); choose another."
+        ) from None
+
+
 def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
     """Read a JSON object.
 
@@ -83,7 +98,7 @@ def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
         value = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
         raise error(f"{path}: no such file; was it made by sainet?") from None
-    except (OSError, ValueError) as cause:
+    except (OSError, ValueError, RecursionError) as cause:
         reason = str(cause).splitlines()[0]
         raise error(f"{path}: cannot be read as JSON ({reason}).") from None
     if not isinstance(value, dict):
@@ -130,19 +145,31 @@ def open_run(
     """
     wanted = json.loads(to_json(dict(config)))
     folder = RunFolder(path, finished_by)
+    with readable(path, RunConflict):
+        _check_free(path, wanted)
+        for leftover in path.glob(".*.partial"):
+            if not leftover.is_dir():  # of an import into this folder, maybe alive
+                leftover.unlink(missing_ok=True)
+    if not (path / MANIFEST).exists():
+        write_json(path / MANIFEST, manifest(devices))
+    if not (path / CONFIG).exists():
+        write_json(path / CONFIG, wanted)
+    return folder
+
+
+def remake(path: Path) -> str:
+    """Say how to make a damaged run again: a finished one is left alone."""
+    return f"delete {path}, then run the command that made it again"
+
+
+def _check_free(path: Path, wanted: dict[str, Any]) -> None:
+    """Check that a folder is missing, empty, or of a run with these settings."""
     if path.exists() and not path.is_dir():
         raise RunConflict(f"{path}: is a file; give --out a folder.")
     if (path / CONFIG).exists():
         _check_same(path, read_json(path / CONFIG, RunConflict), wanted)
     elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
         raise RunConflict(f"{path}: is not empty and no run of sainet; choose another.")
-    for leftover in path.glob(".*.partial"):
-        leftover.unlink(missing_ok=True)
-    if not (path / MANIFEST).exists():
-        write_json(path / MANIFEST, manifest(devices))
-    if not (path / CONFIG).exists():
-        write_json(path / CONFIG, wanted)
-    return folder
 
 
 def _may_be_left(entry: Path) -> bool:

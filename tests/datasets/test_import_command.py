@@ -44,6 +44,9 @@ def test_physics_is_evaluated_on_what_was_imported(
         (["mitpush", "TABLE"], "is no .zip and no folder"),
         (["table", "ZIP", "--properties", "BODIES"], "is no .csv and no .parquet"),
         (["table", "TABLE", "--properties", "TABLE"], "is no TOML"),
+        (["mitpush", "x" * 300], "cannot be read"),
+        (["mitpush-endpoints", "x" * 300], "cannot be read"),
+        (["table", "x" * 300 + ".csv", "--properties", "BODIES"], "cannot be read"),
     ],
 )
 def test_bad_usage_is_one_line_and_status_2(

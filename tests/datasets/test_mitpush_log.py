@@ -261,3 +261,6 @@ def test_the_name_of_a_log_has_to_say_what_it_is(tmp_path: Path):
     assert read_log(write_mat(path, [ROW], shape_id="ellip1", vel=10)).size == 1
     assert "'rect1' inside" in refusal(write_mat(path, [ROW], shape_id="rect1"))
     assert "vel is '20'" in refusal(write_mat(path, [ROW], vel=20))
+    cell = np.empty((1, 1), object)
+    cell[0, 0] = np.array([10.0, 20.0])
+    assert "vel is '[10. 20.]'" in refusal(write_mat(path, [ROW], vel=cell))

@@ -51,6 +51,10 @@ def test_a_missing_store_says_how_to_make_one(tmp_path):
     assert "sainet generate" in refusal(tmp_path / "none")
 
 
+def test_a_name_that_no_folder_can_have_is_refused(tmp_path):
+    assert "cannot be read" in refusal(tmp_path / ("x" * 300))
+
+
 def test_an_unfinished_store_says_how_to_go_on(copy):
     (copy / "hashes.json").unlink()
     message = refusal(copy)
@@ -66,7 +70,10 @@ def test_a_deleted_chunk_is_named(copy, verify):
 
 def test_a_truncated_chunk_is_named(copy):
     os.truncate(copy / CHUNK, 100)
-    assert f"{CHUNK}: truncated or changed" in refusal(copy)
+    message = refusal(copy)
+    assert f"{CHUNK}: truncated or changed" in message
+    # A finished folder is left alone, so that the same command alone does nothing.
+    assert f"delete {copy}, then run the command that made it again" in message
 
 
 def test_a_flipped_byte_is_found(copy):
@@ -110,6 +117,12 @@ def test_newer_attributes_ask_for_a_newer_sainet(copy):
 def test_a_version_that_never_was_is_refused(copy, version):
     edit(copy / "hashes.json", lambda found: found.update(format_version=version))
     assert "format_version is" in refusal(copy)
+
+
+@pytest.mark.parametrize("attributes", [[], None, 3])
+def test_attributes_that_are_none_are_refused(copy, attributes):
+    edit(copy / ATTRIBUTES, lambda found: found.update(attributes=attributes))
+    assert f"{ATTRIBUTES}: attributes are missing" in refusal(copy)
 
 
 @pytest.mark.parametrize("name", ["kind", "pushes", "time_step", "seed"])

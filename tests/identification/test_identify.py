@@ -173,6 +173,9 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
     assert (out / FILE).stat().st_mtime_ns == before
     with pytest.raises(RunConflict, match="data is"):
         identify_into(store.first(5), out)
+    (out / FILE).write_text(json.dumps({"values": values}))
+    with pytest.raises(BadInput, match=f"estimates is missing; delete {out}, then"):
+        identify_into(store, out)
     (out / FILE).unlink()  # as if it had been interrupted
     for use in (load_dynamics, find_assumed_engine):
         with pytest.raises(BadInput, match=f"{FILE}: missing, so .* 'sainet identify'"):
@@ -182,7 +185,7 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("{}", "values is missing"),
+        ("{}", "values is missing; delete .*, then run the command that made it"),
         ('{"values": {"pusher_friction": -1}}', "values.pusher_friction is -1"),
         ('{"values": {"grip": 0.3}}', "values.grip"),
         ('{"values": {"pusher_friction": true}}', "pusher_friction is True"),
@@ -246,7 +249,8 @@ def test_pushes_that_nothing_can_be_learned_from_are_refused(tmp_path):
     arrays = made_up(info)
     blind = arrays | {"pose_observed": 0 * arrays["pose_observed"]}
     with pytest.raises(BadStore, match="no pose was observed"):
-        identify(write(tmp_path / "blind", info, blind))
+        identify_into(write(tmp_path / "blind", info, blind), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_pushes_of_all_lengths_and_looks_count_alike(tmp_path, caplog):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sainet.errors import BadTable
+from sainet.runs import readable
 
 LARGEST_FILE = 16 << 20  # bytes
 LARGEST_SUM = 4 << 30  # bytes
@@ -42,12 +43,13 @@ def list_files(path: Path) -> list[ArchivedFile]:
     Raises:
         BadTable: there is no such file or folder, or a zip is damaged or hostile.
     """
-    if path.is_dir():
-        found = sorted(file for file in path.rglob("*") if file.is_file())
-        return [each for file in found for each in _list_file(file)]
-    if path.suffix.lower() != ".zip" or not path.is_file():
-        raise BadTable(f"{path}: is no .zip and no folder; give one of them.")
-    return _list_file(path)
+    with readable(path, BadTable):
+        if path.is_dir():
+            found = sorted(file for file in path.rglob("*") if file.is_file())
+            return [each for file in found for each in _list_file(file)]
+        if path.suffix.lower() != ".zip" or not path.is_file():
+            raise BadTable(f"{path}: is no .zip and no folder; give one of them.")
+        return _list_file(path)
 
 
 def read_files(files: Sequence[ArchivedFile]) -> Iterator[tuple[ArchivedFile, bytes]]:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from sainet.datasets.mitpush_csv import PLAN, Row, read_csv
 from sainet.datasets.mitpush_mat import read_mat
 from sainet.errors import BadTable
+from sainet.runs import readable
 
 TABLE = "ellip1_endpoints.csv"
 ORIGIN = (
@@ -49,10 +50,11 @@ def find_log(path: Path) -> Path:
     Raises:
         BadTable: there is none; the message says where the pushes come from.
     """
-    file = path / TABLE if path.is_dir() else path
-    if not file.is_file():
-        raise BadTable(f"{file}: no such file; {ORIGIN}.")
-    return file
+    with readable(path, BadTable):
+        file = path / TABLE if path.is_dir() else path
+        if not file.is_file():
+            raise BadTable(f"{file}: no such file; {ORIGIN}.")
+        return file
 
 
 def read_log(path: Path, data: bytes | None = None) -> EndpointLog:

@@ -80,12 +80,12 @@ def _check_name(path: Path, named: dict[str, str], content: dict[str, Any]) -> N
     for part, field in _INSIDE.items():
         if field not in content or np.size(content[field]) != 1:
             continue
-        inside = np.ravel(content[field])[0]
-        same = inside == (float(named[part]) if part == "speed" else named[part])
-        if not same:
+        inside = np.squeeze(_unwrap(content[field]))
+        wanted = float(named[part]) if part == "speed" else named[part]
+        if not np.array_equal(inside, wanted):
             raise BadTable(
-                f"{path}: {field} is {str(inside)!r} inside and {named[part]!r} by its "
-                "name; give the log its own name back."
+                f"{path}: {field} is {str(inside)[:40]!r} inside and {named[part]!r} "
+                "by its name; give the log its own name back."
             )
 
 

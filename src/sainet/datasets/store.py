@@ -12,7 +12,7 @@ from jaxtyping import Int
 from sainet.datasets.schema import FORMAT_VERSION, Kind, StoreInfo, sizes, variables
 from sainet.datasets.writer import ARRAYS, HASHES, chunk_files
 from sainet.errors import BadInput, BadStore
-from sainet.runs import content_hash, read_json
+from sainet.runs import content_hash, read_json, readable, remake
 
 if TYPE_CHECKING:
     import xarray
@@ -126,6 +126,11 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
         BadStore: it is missing, unfinished, damaged or of a newer format.
     """
     folder = Path(path)
+    with readable(folder, BadStore):
+        return _open(folder, verify=verify)
+
+
+def _open(folder: Path, *, verify: bool) -> Store:
     if not folder.is_dir():
         raise BadStore(
             f"{folder}: no such dataset; make one with 'sainet generate' or 'import'."
@@ -136,19 +141,19 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
             "run the command that made it again and it goes on."
         )
     listing = read_json(folder / HASHES, BadStore)
-    _check_version(folder / HASHES, listing)
+    _check_version(folder, folder / HASHES, listing)
     hashes = listing.get("files")
     if not isinstance(hashes, dict) or "zarr.json" not in hashes:
-        raise BadStore(f"{folder / HASHES}: files is missing; make the dataset again.")
+        raise BadStore(f"{folder / HASHES}: files is missing; {remake(folder)}.")
     info = _read_info(folder)
-    _check_listing(folder / HASHES, hashes, info)
+    _check_listing(folder, hashes, info)
     _check_files(folder, hashes, verify=verify)
     store = Store(folder, info)
     _check_shapes(store)
     return store
 
 
-def _check_version(path: Path, found: dict[str, Any]) -> None:
+def _check_version(folder: Path, path: Path, found: dict[str, Any]) -> None:
     version = found.get("format_version")
     if version == FORMAT_VERSION:
         return
@@ -159,15 +164,16 @@ def _check_version(path: Path, found: dict[str, Any]) -> None:
         )
     raise BadStore(
         f"{path}: format_version is {version!r}, not {FORMAT_VERSION}; "
-        "make the dataset again."
+        f"{remake(folder)}."
     )
 
 
-def _check_listing(path: Path, hashes: dict[str, Any], info: StoreInfo) -> None:
+def _check_listing(folder: Path, hashes: dict[str, Any], info: StoreInfo) -> None:
+    path = folder / HASHES
     for index in range(info.chunks):
         for name in chunk_files(info, index):
             if not isinstance(hashes.get(name), str):
-                raise BadStore(f"{path}: {name} has no hash; make the dataset again.")
+                raise BadStore(f"{path}: {name} has no hash; {remake(folder)}.")
 
 
 def _is_count(value: object) -> bool:
@@ -195,17 +201,19 @@ _SENSE: dict[str, Callable[[object], bool]] = {
 
 def _read_info(folder: Path) -> StoreInfo:
     path = folder / ARRAYS / "zarr.json"
-    attributes = read_json(path, BadStore).get("attributes", {})
-    _check_version(path, attributes)
+    attributes = read_json(path, BadStore).get("attributes")
+    if not isinstance(attributes, dict):
+        raise BadStore(f"{path}: attributes are missing; {remake(folder)}.")
+    _check_version(folder, path, attributes)
     names = {field.name for field in fields(StoreInfo)}
     attributes = _LATER | attributes
     missing = sorted(names - attributes.keys())
     if missing:
-        raise BadStore(f"{path}: {missing[0]} is missing; make the dataset again.")
+        raise BadStore(f"{path}: {missing[0]} is missing; {remake(folder)}.")
     known: dict[str, Any] = {name: attributes[name] for name in names}
     for name, makes_sense in _SENSE.items():
         if not makes_sense(known[name]):
-            raise BadStore(f"{path}: {name} is {known[name]!r}; make it again.")
+            raise BadStore(f"{path}: {name} is {known[name]!r}; {remake(folder)}.")
     for name, value in known.items():
         known[name] = tuple(value) if isinstance(value, list) else value
     return StoreInfo(**known)
@@ -220,11 +228,10 @@ def _check_files(folder: Path, hashes: dict[str, Any], *, verify: bool) -> None:
         except OSError:
             data, present = None, False
         if not present:
-            raise BadStore(f"{path}: missing; make the dataset again.")
+            raise BadStore(f"{path}: missing; {remake(folder)}.")
         if data is not None and content_hash(data) != known:
             raise BadStore(
-                f"{path}: truncated or changed since it was written; "
-                "make the dataset again."
+                f"{path}: truncated or changed since it was written; {remake(folder)}."
             )
 
 
@@ -233,8 +240,10 @@ def _check_shapes(store: Store) -> None:
     for name, variable in variables(store.info).items():
         path = store.path / ARRAYS / name
         if name not in store._group:
-            raise BadStore(f"{path}: missing; make the dataset again.")
+            raise BadStore(f"{path}: missing; {remake(store.path)}.")
         found = store._group[name].shape
         wanted = tuple(lengths[d] for d in variable.dimensions)
         if found != wanted:
-            raise BadStore(f"{path}: shape is {found}, not {wanted}; make it again.")
+            raise BadStore(
+                f"{path}: shape is {found}, not {wanted}; {remake(store.path)}."
+            )

@@ -6,6 +6,7 @@ from sainet.datasets.mitpush_log import read_bytes
 from sainet.datasets.table_csv import read_csv
 from sainet.datasets.table_rows import TableRows
 from sainet.errors import BadTable
+from sainet.runs import readable
 
 LARGEST = 1 << 30  # bytes
 
@@ -41,6 +42,7 @@ def read_table_bytes(path: Path) -> bytes:
     """
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise BadTable(f"{path}: is no .csv and no .parquet; give one of them.")
-    if path.is_file() and path.stat().st_size > LARGEST:
-        raise BadTable(f"{path}: has over {LARGEST >> 30} GB; split it by pushes.")
+    with readable(path, BadTable):
+        if path.is_file() and path.stat().st_size > LARGEST:
+            raise BadTable(f"{path}: has over {LARGEST >> 30} GB; split it by pushes.")
     return read_bytes(path)

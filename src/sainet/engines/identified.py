@@ -7,7 +7,7 @@ from typing import Any
 from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.errors import BadInput
-from sainet.runs import CONFIG, is_number, read_json
+from sainet.runs import CONFIG, is_number, read_json, remake
 
 FILE = "identified.json"
 IDENTIFIED = "identified"  # the name of such an engine on a network's card
@@ -55,11 +55,12 @@ def camera_offset(beliefs: Mapping[str, Any]) -> tuple[float, float]:
 
 def is_identified(folder: Path) -> bool:
     """Return whether `sainet identify` made a folder, if only begun."""
-    if (folder / FILE).is_file():
-        return True
     try:
+        if (folder / FILE).is_file():
+            return True
         return read_json(folder / CONFIG).get("command") == "identify"
-    except BadInput:  # missing or damaged: what is there will tell what it is
+    # Missing, damaged or no path at all: what is there will tell what it is.
+    except (BadInput, OSError):
         return False
 
 
@@ -77,12 +78,12 @@ def read_values(folder: Path) -> dict[str, float]:
         )
     values = read_json(path).get("values")
     if not isinstance(values, dict) or not values:
-        raise BadInput(f"{path}: values is missing; run 'sainet identify' again.")
+        raise BadInput(f"{path}: values is missing; {remake(folder)}.")
     for name, value in values.items():
         if not (name in NAMES and is_number(value) and (name in CAMERA or value > 0)):
             kind = "a number" if name in CAMERA else "a positive number"
             raise BadInput(
                 f"{path}: values.{name} is {value!r}; it must be {kind} for one of "
-                f"{', '.join(NAMES)}. Run 'sainet identify' again."
+                f"{', '.join(NAMES)}: {remake(folder)}."
             )
     return values

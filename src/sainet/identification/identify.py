@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +10,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.store import Store
-from sainet.engines.identified import FILE, FRICTIONS, NAMES
-from sainet.errors import BadStore
+from sainet.engines.identified import FILE, FRICTIONS, NAMES, read_values
+from sainet.errors import BadInput, BadStore
 from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     BOUNDS,
@@ -27,7 +27,7 @@ from sainet.identification.residuals import (
     samples,
 )
 from sainet.identification.solve import Try, solve
-from sainet.runs import open_run, read_json, write_json
+from sainet.runs import open_run, read_json, remake, write_json
 
 _log = logging.getLogger(__name__)
 
@@ -65,17 +65,29 @@ def identify_into(
     Raises:
         RunConflict: the folder holds something else.
         BadStore: see `identify`.
+        BadInput: the folder was finished and is damaged.
     """
     settings = {"command": "identify", "data": store.content, "parameters": NAMES}
     check_store(store)
     folder = open_run(out, settings, finished_by=FILE)
     if not folder.is_finished:
         write_json(out / FILE, identify(store, on_try=on_try).to_dict())
-    return read_json(out / FILE)
+    return _read_found(out)
+
+
+def _read_found(out: Path) -> dict[str, Any]:
+    read_values(out)
+    found = read_json(out / FILE)
+    for field in fields(Identified):
+        if field.name not in found:
+            raise BadInput(f"{out / FILE}: {field.name} is missing; {remake(out)}.")
+    return found
 
 
 def check_store(store: Store) -> None:
     """Raise `BadStore` if no parameter can be identified from such pushes."""
+    if not store.read(slice(None), ("pose_observed",))["pose_observed"].any():
+        raise BadStore(f"{store.path}: no pose was observed; there is nothing to fit.")
     if store.info.kind != "robot":
         raise BadStore(
             f"{store.path}: kind is {store.info.kind!r}; parameters are identified "
@@ -107,8 +119,6 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
     """
     check_store(store)
     parts = samples(store)
-    if not parts:
-        raise BadStore(f"{store.path}: no pose was observed; there is nothing to fit.")
     scenes = [part.batch.scene for part in parts]
     start = starting_values(scenes, names_for(scenes[0]))
     _tell_of_one_value(store, start)
