@@ -30,6 +30,7 @@ def test_the_length_of_nothing_has_no_slope():
     np.testing.assert_array_equal(jax.grad(norm)(jnp.zeros(2)), [0, 0])
     np.testing.assert_allclose(jax.grad(norm)(jnp.array([3.0, 4.0])), [0.6, 0.8])
     assert float(norm(jnp.array([3.0, 4.0]))) == 5
+    assert jnp.isnan(norm(jnp.array([jnp.nan, 4.0])))
 
 
 def test_wrapped_angles_are_the_same_directions_within_a_turn():

@@ -26,7 +26,7 @@ def direction(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
 def norm(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
     """Return the length of vectors; its gradient at zero is zero, never NaN."""
     squared = jnp.sum(vector * vector, axis=-1)
-    nonzero = squared > 0
+    nonzero = squared != 0  # NaN, too: its length is NaN
     return jnp.where(nonzero, jnp.sqrt(jnp.where(nonzero, squared, 1.0)), 0.0)
 
 

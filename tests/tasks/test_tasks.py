@@ -1,5 +1,6 @@
 """The task of the paper, and its goals."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -43,6 +44,12 @@ def test_solved_is_within_a_tenth_of_the_radius():
         assert bool(goal_ahead(distance).is_solved(scene(), touching())) is solved
     loose = goal_ahead(0.02, tolerance=0.5)
     assert bool(loose.is_solved(scene(), touching()))
+
+
+def test_a_disk_that_left_the_finite_numbers_is_not_at_its_goal():
+    lost = jax.tree.map(lambda x: x * jnp.nan, touching())
+    assert not bool(goal_ahead(0.0).is_solved(scene(), lost))
+    assert not jnp.isfinite(goal_ahead(0.0).distance(lost))
 
 
 def test_a_disk_on_its_goal_has_no_cost_but_its_alignment():
