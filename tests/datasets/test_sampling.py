@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.sampling import chunk_generator, draw
 from sainet.errors import BadInput
+from sainet.scene import pusher_gaps
 
 
 def drawn(pushes=400, **settings):
@@ -55,6 +57,14 @@ def test_disks_touch_and_do_not_overlap(disks):
         np.testing.assert_allclose(found[:, 0, 1:], 0, atol=1e-9)
 
 
+@pytest.mark.parametrize("disks", [3, 5])
+def test_the_pusher_starts_inside_no_disk(disks):
+    scene, initial, _ = pushed(GenerateConfig(disks=disks, pushes=1500), 3, 1)
+    gaps = pusher_gaps(scene, initial)
+    np.testing.assert_allclose(gaps[:, 0], 0, atol=1e-6)
+    assert gaps[:, 1:].min() > -1e-6
+
+
 def test_second_disks_are_in_front_of_the_first():
     ahead = drawn().position[:, 1]
     assert_uniform(np.arctan2(ahead[:, 1], ahead[:, 0]), -np.pi / 3, np.pi / 3)
@@ -67,6 +77,13 @@ def test_a_gap_parts_the_disks():
 def test_disks_without_room_are_refused():
     with pytest.raises(BadInput, match="--disks 3: no room .* widen --placement-deg"):
         drawn(disks=3, placement_deg=5.0, pushes=1)
+
+
+def test_a_pusher_without_room_is_refused(monkeypatch):
+    inside = np.full((1, 3), -1e-3)
+    monkeypatch.setattr("sainet.datasets.sampling._pusher_gaps", lambda *_: inside)
+    with pytest.raises(BadInput, match="--disks 3: no room was found for the pusher"):
+        drawn(disks=3, pushes=1)
 
 
 def test_each_chunk_draws_its_own():

@@ -59,3 +59,11 @@ def test_a_push_that_moves_nothing_is_told():
     made.observe()
     short = eqx.tree_at(lambda p: p.length, PUSH, jnp.float32(1e-6))
     assert made.push(short).trouble == "disk 1 did not move"
+
+
+def test_a_push_that_begins_inside_another_disk_is_told():
+    made = robot()
+    made.observe()
+    backwards = eqx.tree_at(lambda p: p.contact_angle, PUSH, jnp.float32(np.pi))
+    trouble = made.push(backwards).trouble
+    assert trouble == "the pusher began 9.6 mm inside disk 2"

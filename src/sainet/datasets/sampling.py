@@ -1,6 +1,6 @@
 """Random scenes and pushes with the distributions of the paper (section IV-B)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -37,12 +37,12 @@ def draw(config: GenerateConfig, rng: np.random.Generator, pushes: int) -> Draws
     """Draw scenes and pushes.
 
     Raises:
-        BadInput: no room was found for a disk beside the others.
+        BadInput: no room was found for a disk, or for the pusher, beside the others.
     """
     radius = _uniform(rng, config.radius_mm, (pushes, config.disks)) / 1000
     contact = np.deg2rad(config.contact_angle_deg)
     heading = np.deg2rad(config.direction_deg)
-    return Draws(
+    draws = Draws(
         mass=_uniform(rng, config.mass_kg, (pushes, config.disks)),
         radius=radius,
         table_friction=_uniform(rng, config.table_friction, (pushes,)),
@@ -53,6 +53,7 @@ def draw(config: GenerateConfig, rng: np.random.Generator, pushes: int) -> Draws
         stroke=_uniform(rng, config.stroke_mm, (pushes,)) / 1000,
         speed=_uniform(rng, config.speed_mm_s, (pushes,)) / 1000,
     )
+    return _with_free_pusher(config, rng, draws)
 
 
 def _uniform(
@@ -83,6 +84,44 @@ def _place(
         f"--disks {config.disks}: no room was found for all of them without "
         "overlap; widen --placement-deg or narrow --radius-mm."
     )
+
+
+def _with_free_pusher(
+    config: GenerateConfig, rng: np.random.Generator, draws: Draws
+) -> Draws:
+    """Place disks and pusher again where the pusher would start inside a disk.
+
+    The pushed disk is where the pusher starts; from three disks on another may be.
+    """
+    position, contact_angle = draws.position.copy(), draws.contact_angle.copy()
+    # A generator of their own: what is drawn again changes no other push.
+    (again,) = rng.spawn(1)
+    for _ in range(_ARRANGEMENTS):
+        draws = replace(draws, position=position, contact_angle=contact_angle)
+        inside = np.flatnonzero((_pusher_gaps(config, draws)[:, 1:] < 0).any(axis=1))
+        if not len(inside):
+            return draws
+        widest = np.deg2rad(config.contact_angle_deg)
+        contact_angle[inside] = again.uniform(-widest, widest, len(inside))
+        for push in inside:
+            position[push] = _place(config, again, draws.radius[push])
+    raise BadInput(
+        f"--disks {config.disks}: no room was found for the pusher without overlap; "
+        "narrow --placement-deg or --pusher-radius-mm."
+    )
+
+
+def _pusher_gaps(
+    config: GenerateConfig, draws: Draws
+) -> Float[np.ndarray, "push body"]:
+    """Return the gaps between pusher and disks at the start (m); negative: overlap."""
+    pushed, radius = draws.position[:, 0], config.pusher_radius_mm / 1000
+    ahead = draws.position[:, min(1, config.disks - 1)] - pushed
+    angle = np.arctan2(ahead[:, 1], ahead[:, 0]) + draws.contact_angle
+    reach = draws.radius[:, :1] + radius + config.gap_mm / 1000
+    pusher = pushed - reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    apart = np.linalg.norm(draws.position - pusher[:, None], axis=-1)
+    return apart - draws.radius - radius
 
 
 def _find_room(

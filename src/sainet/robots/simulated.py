@@ -18,7 +18,7 @@ from sainet.pushes import (
     push_direction,
 )
 from sainet.robots.base import AbstractRobot, Recording
-from sainet.scene import FrictionField, Scene, State, at_rest
+from sainet.scene import FrictionField, Scene, State, at_rest, pusher_gaps
 
 PUSH_STEPS = 200  # 48 of motion; then the pusher holds while the disks come to rest
 
@@ -81,7 +81,8 @@ class SimulatedRobot(AbstractRobot):
         before, end = self.truth, jax.tree.map(lambda x: x[-1], states)
         self.truth = at_rest(end.position, end.angle, end.pusher_position)
         pusher = np.asarray(states.pusher_position)
-        return Recording(push, path, pusher, _trouble(before, path))
+        trouble = _start_trouble(plain, initial) or _trouble(before, path)
+        return Recording(push, path, pusher, trouble)
 
     def _disturb(self, controls: PathControls) -> PathControls:
         moving = np.abs(np.asarray(controls.velocity)).max(axis=-1) > 0
@@ -93,6 +94,16 @@ class SimulatedRobot(AbstractRobot):
 
 
 _STILL = 1e-4  # m
+_DEEPEST = 1e-3  # m, more than sight is wrong by
+
+
+def _start_trouble(scene: Scene, initial: State) -> str | None:
+    """Say if the pusher began inside a disk that it was not to push."""
+    depth = -np.asarray(pusher_gaps(scene, initial))[0, 1:]
+    if not (depth > _DEEPEST).any():
+        return None
+    disk = 2 + int(np.argmax(depth))
+    return f"the pusher began {1000 * depth.max():.1f} mm inside disk {disk}"
 
 
 def _trouble(before: State, path: np.ndarray) -> str | None:
