@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import jax
 import numpy as np
 import pytest
 
@@ -18,6 +19,8 @@ from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trial import make_trial
 from sainet.control.trials import episode_file, run_trials
 from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+from sainet.robots.base import Recording
+from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs import CONFIG as CONFIG_FILE
 from sainet.runs import read_json, write_json
 from support import REPOSITORY
@@ -82,6 +85,25 @@ def test_a_damaged_episode_is_named_with_the_way_out(tmp_path, done, text, says)
     episode_file(out, 0).write_text(text)
     with pytest.raises(BadInput, match=f"000.json: .*{says}.*delete it"):
         run_trials(CONFIG, out)
+
+
+def test_an_episode_that_leaves_the_finite_numbers_is_recorded(tmp_path, monkeypatch):
+    def diverge(self, push):
+        self.truth = jax.tree.map(lambda x: x * np.nan, self.truth)
+        lost = np.full((PUSH_STEPS, 2, 3), np.nan, np.float32)
+        return Recording(push, lost, lost[:, 0, :2])
+
+    monkeypatch.setattr(SimulatedRobot, "push", diverge)
+    config = replace(CONFIG, trials=1)
+    (told,) = run_trials(config, tmp_path / "out")
+    assert (told["solved"], told["final_mm"]) == (False, None)
+    assert "NaN" in told["reason"]
+    assert told["turns"][0]["actual"][0] == [[None] * 3] * 2
+    found = summarise([told])
+    assert (found["solved"], found["within_4_mm"]) == (0, 0.0)
+    assert found["median_final_mm"] is None
+    monkeypatch.setattr(trials, "run_episode", None)  # what is there is enough
+    assert run_trials(config, tmp_path / "out") == [told]
 
 
 def test_a_network_trained_again_is_another_model(tmp_path):
@@ -154,13 +176,38 @@ def test_a_process_that_is_interrupted_keeps_its_pushes_and_the_next_one_starts_
     assert not (out / "episodes/000.interrupted.json").exists()
 
 
-def test_a_turn_that_lacks_something_is_named(tmp_path, done):
+def lack(name):
+    return lambda record: record["turns"][1].pop(name)
+
+
+def put(name, value):
+    return lambda record: record.update({name: value})
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        (lack("planned"), r"turns\[1\].planned is missing"),
+        (lack("distance_mm"), r"turns\[1\].distance_mm is missing"),
+        (lambda r: r["turns"].append(3), r"turns\[2\].observed is missing"),
+        (lambda r: r["turns"][0]["actual"].pop(), r"pusher is .* shape \[time, 2\]"),
+        (put("final", [[1, 2, 3]]), r"final is .* not numbers of shape \[disk, 3\]"),
+        (put("goal_mm", [1, None]), "goal_mm is"),
+        (put("goal_mm", [1, "2"]), "goal_mm is"),
+        (put("decision_s", [float("inf")]), "decision_s is"),
+        (put("tolerance_mm", float("nan")), "tolerance_mm is 'nan' and not a number"),
+        (put("final_mm", True), "final_mm is"),
+        (put("moved", 2), "moved is 2 of 2 disks"),
+        (put("trial", 1), "trial is 1, which is another episode"),
+    ],
+)
+def test_what_is_wrong_in_an_episode_is_named(tmp_path, done, damage, says):
     out = tmp_path / "out"
     shutil.copytree(done[0], out)
     known = json.loads(episode_file(out, 0).read_text())
-    del known["turns"][1]["planned"]
+    damage(known)
     episode_file(out, 0).write_text(json.dumps(known))
-    with pytest.raises(BadInput, match=r"turns\[1\].planned is missing.*delete it"):
+    with pytest.raises(BadInput, match=says + ".*delete it"):
         run_trials(CONFIG, out)
 
 

@@ -155,3 +155,11 @@ def record(pushes=3, **changes):
         "decision_s": [0.1] * pushes,
     }
     return known | changes
+
+
+def lost_record():
+    """Return the record of an episode whose last push left the finite numbers."""
+    lost = record(solved=False, reason="the simulated world left", final_mm=None)
+    lost["turns"][-1]["actual"][1:] = [[[None] * 3] * 2] * 2
+    lost["turns"][-1]["pusher"][1:] = [[None] * 2] * 2
+    return lost | {"final": [[None] * 3] * 2}

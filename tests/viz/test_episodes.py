@@ -8,7 +8,7 @@ import numpy as np
 from sainet.viz.episode_frames import EpisodeFrames, episode_data, outcome
 from sainet.viz.episodes import body_paths, draw_episodes
 from sainet.viz.palette import MOVED, PUSHED
-from viz.samples import record
+from viz.samples import lost_record, record
 
 
 def test_a_path_goes_from_the_first_sight_to_the_end():
@@ -62,6 +62,16 @@ def test_the_end_is_told_by_where_the_disk_truly_is():
     assert outcome(seen) == "not at the goal after 3 pushes"
     lost = record(solved=False, reason="out of pushes")
     assert outcome(lost) == "out of pushes after 3 pushes"
+
+
+def test_what_left_the_finite_numbers_is_not_drawn(tmp_path):
+    records = [lost_record(), lost_record() | {"turns": []}]
+    text = draw_episodes(records, tmp_path / "a.svg").read_text()
+    assert "nan" not in text.lower().replace("nance", "")
+    for lost in records:
+        data = json.loads(json.dumps(episode_data(lost), allow_nan=False))
+        assert data["distances"][-1] is None
+        assert data["bodies"][0]["x"][-1] is data["bodies"][0]["angle"][-1] is None
 
 
 def test_a_long_reason_leaves_room_for_the_picture(tmp_path):

@@ -52,7 +52,11 @@ def folder(tmp_path):
         table=samples.result(),
         figures=[(figure, "Paths of one push.")],
         replays=[samples.replay()],
-        episodes=[samples.record(), samples.record(pushes=0)],
+        episodes=[
+            samples.record(),
+            samples.record(pushes=0),
+            samples.lost_record(),
+        ],
     )
     write_report(report, tmp_path / "report.html")
     return tmp_path
@@ -182,6 +186,9 @@ def test_an_episode_plays_to_its_end_and_one_without_a_push_stands_still(still):
     scrub_to(still, 0, "episode-1")
     ended = element(still, "status", "episode-1").text
     assert ended == "solved with 0 pushes: disk 2 is 2.3 mm from its goal"
+    scrub_to(still, 11, "episode-2")
+    lost = element(still, "status", "episode-2").text
+    assert lost == "the simulated world left after 3 pushes: disk 2 is nowhere"
 
 
 def test_nothing_is_wider_than_a_phone(still):

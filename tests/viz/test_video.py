@@ -11,7 +11,7 @@ from sainet.errors import MissingExtra
 from sainet.viz import video
 from sainet.viz.episode_frames import EpisodeFrames
 from sainet.viz.video import best_format, draw_frames, frame_count, write_film
-from viz.samples import record
+from viz.samples import lost_record, record
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +26,11 @@ def test_a_film_shows_every_frame_and_then_holds(pictures):
     changes = [np.any(a != b) for a, b in zip(pictures, pictures[1:], strict=False)]
     assert all(changes[: shown - 1])
     assert not any(changes[shown - 1 :])
+
+
+def test_a_film_goes_on_where_the_world_left_the_finite_numbers():
+    lost = lost_record()
+    assert len(list(draw_frames(lost))) == frame_count(lost)
 
 
 @pytest.mark.parametrize("pushes", [0, 1])

@@ -1,5 +1,6 @@
 """An episode as JSON values: what was decided, predicted and seen at every push."""
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -7,32 +8,13 @@ import numpy as np
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
+from sainet.control.record_check import flaw
 from sainet.control.trial import Trial
 from sainet.errors import BadInput
 from sainet.runs import read_json
 from sainet.scene import State
 
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
-_NUMBER = (int, float)
-_FIELDS: dict[str, type | tuple[type, ...]] = {
-    "trial": int,
-    "model": str,
-    "goals": str,
-    "reason": str,
-    "solved": bool,
-    "final_mm": _NUMBER,
-    "pushes": int,
-    "final": list,
-    "decision_s": list,
-    "goal_mm": list,
-    "moved": int,
-    "radius_mm": list,
-    "pusher_radius_mm": _NUMBER,
-    "tolerance_mm": _NUMBER,
-    "table_friction": _NUMBER,
-    "turns": list,
-}
-_TURN_FIELDS = ("observed", "planned", "actual", "pusher")
 
 
 def record(
@@ -41,11 +23,11 @@ def record(
     """Return the record of an episode; lengths in mm, angles in degrees.
 
     `solved` is judged by where the disk truly is, not by where it was seen: sight is
-    as noisy as everything else.
+    as noisy as everything else. What left the finite numbers is None.
     """
     task, robot = trial.task, trial.robot
     final = 1000 * float(task.distance(robot.truth))
-    return {
+    told = {
         "trial": index,
         "model": config.model,
         "goals": config.goals,
@@ -63,6 +45,7 @@ def record(
         "table_friction": float(robot.scene.table_friction),
         "turns": [_turn(trial, turn) for turn in episode.turns],
     }
+    return _finite_or_none(told)
 
 
 def read_record(path: Path) -> dict[str, Any]:
@@ -76,16 +59,8 @@ def read_record(path: Path) -> dict[str, Any]:
         found = read_json(path)
     except BadInput as error:
         raise BadInput(f"{error} Or {again}.") from None
-    for name, kind in _FIELDS.items():
-        if not isinstance(found.get(name), kind):
-            what = "is missing" if name not in found else f"is {found[name]!r}"
-            raise BadInput(f"{path}: {name} {what}, so it is no episode; {again}.")
-    for index, turn in enumerate(found["turns"]):
-        known = turn if isinstance(turn, dict) else {}
-        for name in _TURN_FIELDS:
-            if not isinstance(known.get(name), list):
-                where = f"turns[{index}].{name}"
-                raise BadInput(f"{path}: {where} is missing or no list; {again}.")
+    if wrong := flaw(found, path.stem):
+        raise BadInput(f"{path}: {wrong}, so it is no episode; {again}.")
     return found
 
 
@@ -115,6 +90,16 @@ def poses_of(state: State) -> np.ndarray:
     return np.concatenate(
         [np.asarray(state.position), np.asarray(state.angle)[..., None]], axis=-1
     )
+
+
+def _finite_or_none(value: Any) -> Any:  # noqa: ANN401
+    """Return JSON values with null for numbers that JSON has not."""
+    if isinstance(value, dict):
+        return {name: _finite_or_none(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [_finite_or_none(each) for each in value]
+    is_lost = isinstance(value, float) and not math.isfinite(value)
+    return None if is_lost else value
 
 
 def _poses(pose: np.ndarray) -> list:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 from scipy.stats import binomtest
 
 from sainet.control.episode import SOLVED
@@ -20,10 +20,11 @@ Records = Sequence[dict[str, Any]]
 def summarise(records: Records) -> dict[str, Any]:
     """Return success with its Wilson 95 % interval, medians and shares."""
     solved, near, soon = (reached(records, measure) for measure in MEASURES)
-    pushes, final = _column(records, "pushes"), _column(records, "final_mm")
+    pushes, final = _column(records, "pushes"), _final_mm(records)
     seconds = [s for record in records for s in record["decision_s"]]
     # Seen within the tolerance, and truly without: sight is noisy.
     ended = np.array([record["reason"] == SOLVED for record in records])
+    median = float(np.median(final))
     interval = binomtest(int(solved.sum()), len(solved)).proportion_ci(method="wilson")
     return {
         "trials": len(records),
@@ -34,7 +35,7 @@ def summarise(records: Records) -> dict[str, Any]:
         "median_decision_s": float(np.median(seconds)) if seconds else None,
         "within_4_mm": float(near.mean()),
         "within_25_pushes": float(soon.mean()),
-        "median_final_mm": float(np.median(final)),
+        "median_final_mm": median if np.isfinite(median) else None,
         "ended_early": int((ended & ~solved).sum()),
     }
 
@@ -43,10 +44,16 @@ def reached(records: Records, measure: str) -> Bool[np.ndarray, " record"]:
     """Return which episodes reached one of `MEASURES`."""
     solved = _column(records, "solved")
     if measure == "within_4_mm":
-        return _column(records, "final_mm") <= _NEAR_MM
+        return _final_mm(records) <= _NEAR_MM
     if measure == "within_25_pushes":
         return solved & (_column(records, "pushes") <= _FEW_PUSHES)
     return solved
+
+
+def _final_mm(records: Records) -> Float[np.ndarray, " record"]:
+    """Return how far each episode ended from its goal; infinite where it diverged."""
+    far = [record["final_mm"] for record in records]
+    return np.array([np.inf if distance is None else distance for distance in far])
 
 
 def _column(records: Records, name: str) -> np.ndarray:

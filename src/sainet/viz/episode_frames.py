@@ -1,6 +1,6 @@
 """An episode as frames that play: what the page and the video of it are made of."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -61,7 +61,8 @@ class EpisodeFrames:
     @property
     def distances(self) -> list[float]:
         """The distance from the goal before each push, and at the end (mm)."""
-        return [turn["distance_mm"] for turn in self._turns] + [self.record["final_mm"]]
+        seen = [turn["distance_mm"] for turn in self._turns]
+        return np.asarray([*seen, self.record["final_mm"]], float).tolist()
 
     def turn_at(self, frame: int) -> int:
         """Return which push is under way; -1 when there is none."""
@@ -107,7 +108,7 @@ def episode_data(record: Record) -> dict[str, Any]:
         "moved": record["moved"],
         "bodies": [
             _plane(frames.poses[:, body])
-            | {"angle": np.deg2rad(frames.poses[:, body, 2]).round(5).tolist()}
+            | {"angle": _numbers(np.deg2rad(frames.poses[:, body, 2]).round(5))}
             for body in range(frames.poses.shape[1])
         ],
         "pusher": _plane(frames.pusher),
@@ -115,13 +116,14 @@ def episode_data(record: Record) -> dict[str, Any]:
             {"start": start, "plan": [_plane(plan[:, i]) for i in range(plan.shape[1])]}
             for start, plan in zip(frames.starts, frames.plans, strict=True)
         ],
-        "distances": frames.distances,
+        "distances": _numbers(frames.distances),
     }
 
 
 def _plane(places: np.ndarray) -> dict[str, list[float | None]]:
-    """Return x and y; what is not finite has no place in JSON: None."""
-    return {
-        name: [value if np.isfinite(value) else None for value in places[:, axis]]
-        for axis, name in enumerate("xy")
-    }
+    return {name: _numbers(places[:, axis]) for axis, name in enumerate("xy")}
+
+
+def _numbers(values: Iterable[float]) -> list[float | None]:
+    """Return numbers; what is not finite has no place in JSON: None."""
+    return [float(value) if np.isfinite(value) else None for value in values]

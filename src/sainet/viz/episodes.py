@@ -53,7 +53,8 @@ def _extent(records: Sequence[Record]) -> tuple[np.ndarray, np.ndarray]:
     goals = np.array([record["goal_mm"] for record in records])
     every = np.concatenate([*places, goals])
     reach = _MARGIN + max(max(record["radius_mm"]) for record in records)
-    return every.min(axis=0) - reach, every.max(axis=0) + reach
+    # What diverged has no place.
+    return np.nanmin(every, axis=0) - reach, np.nanmax(every, axis=0) + reach
 
 
 def draw_episode(axes: Axes, record: Record) -> None:
@@ -69,19 +70,22 @@ def draw_episode(axes: Axes, record: Record) -> None:
     end = path[-1, record["moved"], :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
     said = textwrap.fill(outcome(record), _TITLE_WIDTH)
-    axes.set_title(f"{said}\n{record['final_mm']:.1f} mm off")
+    off = record["final_mm"]
+    axes.set_title(said if off is None else f"{said}\n{off:.1f} mm off")
     axes.set_aspect("equal")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
 
 def body_paths(record: Record) -> np.ndarray:
-    """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg)."""
+    """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg).
+
+    NaN where they left the finite numbers.
+    """
     turns = record["turns"]
     if not turns:
         return np.asarray([record["final"]], float)
-    return np.concatenate(
-        [np.asarray([turns[0]["observed"]]), *(np.asarray(t["actual"]) for t in turns)]
-    )
+    parts = [[turns[0]["observed"]], *(turn["actual"] for turn in turns)]
+    return np.concatenate([np.asarray(part, float) for part in parts])
 
 
 def body_color(record: Record, body: int) -> str:
@@ -93,4 +97,5 @@ def body_color(record: Record, body: int) -> str:
 
 def _disk(axes: Axes, centre: Place, radius: float, **look: Any) -> None:  # noqa: ANN401
     look.setdefault("edgecolor", INK)
-    axes.add_patch(Circle((centre[0], centre[1]), radius, linewidth=0.8, **look))
+    if np.isfinite(centre).all():
+        axes.add_patch(Circle((centre[0], centre[1]), radius, linewidth=0.8, **look))

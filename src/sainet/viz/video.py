@@ -131,8 +131,8 @@ class _Stage:
         scene.add_patch(self._pusher)
         places = self.frames.poses[..., :2].reshape(-1, 2)
         reach = max(record["radius_mm"]) + 12
-        low = np.minimum(places.min(axis=0), goal) - reach
-        high = np.maximum(places.max(axis=0), goal) + reach
+        low = np.fmin(np.fmin.reduce(places), goal) - reach  # what diverged is NaN
+        high = np.fmax(np.fmax.reduce(places), goal) + reach
         scene.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         scene.set(xlabel="x (mm)", ylabel="y (mm)")
         return disks
@@ -144,7 +144,8 @@ class _Stage:
         # Its last point lies on the edge; that is no reason to make the chart smaller.
         look = {"color": color, "markersize": 3, "clip_on": False, "in_layout": False}
         (curve,) = chart.plot([], [], "o-", **look)
-        chart.set(xlim=(0, max(len(distances) - 1, 1)), ylim=(0, 1.05 * max(distances)))
+        high = 1.05 * np.fmax.reduce([*distances, self.record["tolerance_mm"]])
+        chart.set(xlim=(0, max(len(distances) - 1, 1)), ylim=(0, high))
         chart.set(xlabel="push", title="Distance from the goal (mm)")
         add_grid(chart)
         return curve

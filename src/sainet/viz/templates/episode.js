@@ -116,9 +116,10 @@ class Episode extends Transport {
     strokeWith(context, this.colors[this.data.moved], 2);
     context.beginPath();
     const seen = this.observations();
-    distances.slice(0, seen).forEach((value, push) => context.lineTo(...at(push, value)));
+    const curve = distances.slice(0, seen).map((value, push) => at(push, value ?? NaN));
+    curve.forEach((place) => context.lineTo(...place));
     context.stroke();
-    const place = at(seen - 1, distances[seen - 1]);
+    const place = curve[seen - 1];
     drawDot(context, place, 4, this.colors[this.data.moved]);
   }
 
@@ -152,7 +153,9 @@ class Episode extends Transport {
     const seconds = this.step * this.data.timeStep;
     this.writeTime(`${seconds.toFixed(1)} s`);
     const [seen, { turns, distances, moved, said }] = [this.observations(), this.data];
-    const distance = `disk ${moved + 1} is ${distances[seen - 1].toFixed(1)} mm from its goal`;
+    const away = distances[seen - 1]; // null where the world left the finite numbers
+    const where = away === null ? "nowhere" : `${away.toFixed(1)} mm from its goal`;
+    const distance = `disk ${moved + 1} is ${where}`;
     const isOver = this.step >= this.data.steps;
     const push = `push ${this.turn() + 1} of ${turns.length}`;
     this.find("status").textContent = isOver ? `${said}: ${distance}` : `${push}: ${distance}`;

@@ -35,7 +35,7 @@ class Bounds {
   }
 
   add(x, y, margin = 0) {
-    if (!Number.isFinite(x + y)) return;
+    if (!Number.isFinite(x) || !Number.isFinite(y)) return; // null is no number either
     this.left = Math.min(this.left, x - margin);
     this.right = Math.max(this.right, x + margin);
     this.bottom = Math.min(this.bottom, y - margin);
