@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from models.samples import Glide
-from planning.scenes import goal_ahead, scene, touching
+from planning.scenes import FEW, goal_ahead, scene, touching
 from sainet.control.episode import Episode, checked, distances, run_episode
 from sainet.errors import BadScene
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.base import AbstractPlanner, Found, Plan
+from sainet.planning.greedy import GreedyPlanner
 from sainet.pushes import PushGrid
 from sainet.robots.base import AbstractRobot, Recording
 
@@ -123,8 +124,17 @@ def test_a_goal_out_of_reach_is_named_as_the_reason():
 def test_an_observation_that_is_no_number_ends_it_with_the_reason():
     robot = Rail(step=float("nan"))
     episode = run(robot)
-    assert "NaN" in episode.reason
+    assert episode.reason == "nothing can be planned: observation: position holds NaN"
     assert len(episode.turns) == 1
+
+
+def test_a_model_that_predicts_nothing_finite_ends_it_with_the_reason():
+    lost = eqx.tree_at(lambda task: task.goal, TASK, TASK.goal * jnp.nan)
+    planner = GreedyPlanner(actions=FEW)
+    episode = run_episode(Rail(), planner, MODEL, lost, scene())
+    told = "nothing can be planned: model: each of the 6 pushes that it predicted left"
+    assert episode.reason.startswith(told)
+    assert episode.turns == []
 
 
 def test_an_interruption_keeps_what_there_is():

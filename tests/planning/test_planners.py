@@ -13,7 +13,7 @@ import pytest
 from models.samples import quick_dynamics
 from planning.scenes import FEW, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
-from sainet.errors import BadCheckpoint, BadInput, BadScene, UnknownName
+from sainet.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.greedy import GreedyPlanner
@@ -183,6 +183,14 @@ def test_disks_in_one_another_are_refused(name):
     with pytest.raises(BadScene, match="overlap by 8.0 mm"):
         planner.plan(PHYSICS, FAR, SCENE, touching(-0.008))
     assert planner.plan(PHYSICS, FAR, SCENE, touching(-0.0005)).warnings == ()
+
+
+@every_planner
+def test_a_model_that_predicts_nothing_finite_is_not_planned_with(name):
+    lost = eqx.tree_at(lambda task: task.goal, FAR, FAR.goal * jnp.nan)
+    planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
+    with pytest.raises(Diverged, match="pushes that it predicted left the finite"):
+        planner.plan(PHYSICS, lost, SCENE, STATE)
 
 
 def doubtful(dynamics, state=None, actions=FEW):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
-from sainet.errors import BadScene
+from sainet.errors import BadScene, Diverged
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Plan
 from sainet.pushes import Push
@@ -82,8 +82,8 @@ def run_episode(
         start = time.perf_counter()
         try:
             plan = planner.plan(dynamics, task, scene, state)
-        except BadScene as error:
-            return _end(episode, str(error))
+        except (BadScene, Diverged) as error:
+            return _end(episode, f"nothing can be planned: {error}")
         seconds = time.perf_counter() - start
         recording = checked(robot.push(plan.pushes[0]), plan.pushes[0])
         turn = Turn(state, plan, recording, seconds)

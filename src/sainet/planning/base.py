@@ -55,6 +55,7 @@ class AbstractPlanner(eqx.Module):
         Raises:
             BadScene: the observation is not finite, or disks lie in one another.
             BadCheckpoint: the model is for another time step or for other controls.
+            Diverged: whatever is pushed, the model leaves the finite numbers.
         """
         check_model(dynamics, scene)
         gap = check_observation(scene, state)

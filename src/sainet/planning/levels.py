@@ -7,6 +7,7 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
+from sainet.errors import Diverged
 from sainet.planning.base import Found
 from sainet.planning.outcomes import Outcomes
 from sainet.scene import State
@@ -61,6 +62,9 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     Args:
         levels: from short sequences to long ones.
         is_complete: whether everything was looked at that should have been.
+
+    Raises:
+        Diverged: no cost is finite: there is nothing to choose by.
     """
     looked_at = sum(len(level.actions) for level in levels)
     for level in levels:
@@ -71,4 +75,9 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
                 int(np.argmin(distance)), looked_at, is_complete=is_complete
             )
     best = min(levels, key=lambda level: level.cost.min())
+    if not np.isfinite(best.cost.min()):
+        raise Diverged(
+            f"model: each of the {looked_at} pushes that it predicted left the finite "
+            "numbers; check the scene and the observation, or give another model."
+        )
     return best.found(int(best.cheapest(1)[0]), looked_at, is_complete=is_complete)
