@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from sainet.cli.entry import run
 from sainet.datasets.config import GenerateConfig, bounds
 from sainet.engines.config import NoiseConfig
 from sainet.errors import BadInput
@@ -88,9 +89,18 @@ for name, value in bad:
 @pytest.mark.parametrize("value", [-1.0, NAN, INFINITE])
 @pytest.mark.parametrize("name", NoiseConfig.__dataclass_fields__)
 def test_bad_noise_is_refused_by_its_option(name, value):
-    option = "--noise." + name.replace("_", "-")
+    option = "--" + name.replace("_", "-")
     with pytest.raises(BadInput, match=f"^{option} is "):
         GenerateConfig(noise=NoiseConfig(**{name: value}))
+
+
+@pytest.mark.parametrize("name", NoiseConfig.__dataclass_fields__)
+def test_the_option_that_is_named_is_one_of_the_command(name, tmp_path, capfd):
+    with pytest.raises(BadInput) as refused:
+        GenerateConfig(noise=NoiseConfig(**{name: -1.0}))
+    option = str(refused.value).split()[0]
+    assert run(["generate", f"{option}=-1", "--out", str(tmp_path / "out")]) == 2
+    assert capfd.readouterr().err == f"sainet: {refused.value}\n"
 
 
 @pytest.mark.parametrize("name", ["correlation_time", "friction_length_mm"])

@@ -58,7 +58,8 @@ class GenerateConfig:
     speed_mm_s: Range = (50.0,)
     """Speed of a push (robot)."""
     hold_steps: int = 152
-    """Steps that follow the stroke (robot): 48 + 152 = 200."""
+    """Steps that follow the stroke (robot): 48 + 152 = 200. The sum is rounded up to
+    whole 40s."""
     force_n: float = 8.0
     """Force on the pusher (direct force)."""
     force_steps: int = 480
@@ -125,7 +126,7 @@ def _check_noise(noise: NoiseConfig) -> None:
         scale = name in ("correlation_time", "friction_length_mm")
         good = _finite(value) and (value > 0 if scale else value >= 0)
         wanted = "positive" if scale else "0 or more"
-        require_option(good, f"noise.{name}", wanted, value)
+        require_option(good, name, wanted, value)
 
 
 def _require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
