@@ -10,6 +10,7 @@ import subprocess
 import time
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -19,7 +20,8 @@ from sainet.datasets import writer
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
-from sainet.errors import BadInput, MissingExtra, RunConflict
+from sainet.errors import BadInput, Diverged, MissingExtra, RunConflict
+from support import require
 
 
 @pytest.mark.slow
@@ -159,6 +161,30 @@ def test_disks_without_room_leave_nothing_behind(tmp_path):
     with pytest.raises(BadInput, match="no room"):
         generate(config, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_no_room_in_a_later_chunk_is_found_before_any_work(tmp_path):
+    """Of these eight chunks the sixth alone cannot be drawn."""
+    config = GenerateConfig(disks=3, placement_deg=32.3, pushes=40, chunk_size=5)
+    with pytest.raises(BadInput, match="no room"):
+        generate(config, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "engines", [{"engine": "bullet"}, {"assumed_engine": ("bullet-calibrated",)}]
+)
+def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines):
+    require(find_spec("pybullet"), "PyBullet is not installed")
+    with pytest.raises(BadInput, match="--disks is 31; it must be at most 30 with"):
+        generate(GenerateConfig(disks=31, pushes=1, **engines), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_truth_beyond_the_numbers_is_refused(tmp_path):
+    light = small(mass_kg=(1e-42,), pushes=7, noise_level="none")
+    with pytest.raises(Diverged, match="push 0 of the dataset: the engine planar left"):
+        generate(light, tmp_path / "store")
 
 
 def test_a_missing_engine_leaves_nothing_behind(tmp_path, monkeypatch):

@@ -63,6 +63,19 @@ def test_bad_usage_is_one_line_and_status_2(
     assert [path.name for path in tmp_path.iterdir()] == ["in"]
 
 
+def test_a_push_that_an_engine_cannot_follow_is_named(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    light = PROPERTIES.replace("mass = 1.0", "mass = 1e-42")
+    table, bodies = write(tmp_path / "in", to_csv(rows("a-7")), light)
+    words = ["import", "table", str(table), "--properties", str(bodies)]
+    assert run([*words, "--out", str(tmp_path / "out")]) == 1
+    error = capfd.readouterr().err
+    assert error.startswith(f"sainet: {table}: push 'a-7': the engine planar-calib")
+    assert len(error.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_command_line_goes_before_the_properties(sources, tmp_path: Path):
     out = tmp_path / "out"
     words = ["import", "table", *sources["table"], "--out", str(out)]

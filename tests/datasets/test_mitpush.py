@@ -303,7 +303,7 @@ def test_a_friction_that_cannot_be_is_refused(
 ):
     with pytest.raises(BadInput, match="--contact-friction is"):
         import_endpoints(small, tmp_path / "out", contact_friction=value)
-    with pytest.raises(BadInput, match="--table-friction is"):
+    with pytest.raises(BadInput, match="^table_friction is"):
         import_endpoints(small, tmp_path / "out", table_friction=value)
     assert not (tmp_path / "out").exists()
 

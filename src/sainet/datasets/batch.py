@@ -1,5 +1,6 @@
 """A batch of stored pushes as the types that engines and models work on."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -8,8 +9,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from sainet.datasets.schema import StoreInfo, simulated_name
+from sainet.errors import Diverged
 from sainet.pushes import Controls, ForceControls, PathControls
-from sainet.scene import Scene, State, Trajectory, unpack_motion
+from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
 
 
 class PushBatch(eqx.Module):
@@ -101,7 +103,28 @@ def to_controls(
 
 def from_trajectory(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Return a trajectory's packed motion and the pusher's path as NumPy arrays."""
-    from sainet.scene import pack_motion
-
     motion = np.asarray(pack_motion(trajectory.states))
     return motion, np.asarray(trajectory.states.pusher_position)
+
+
+def check_finite(
+    engine: str,
+    motion: Float[np.ndarray, "push time body 6"],
+    names: Sequence[str],
+) -> None:
+    """Check that an engine stayed within the numbers.
+
+    Args:
+        engine: its name.
+        motion: packed, of each push.
+        names: what the user knows each push by.
+
+    Raises:
+        Diverged: it left them; the message names the first push in which it did.
+    """
+    finite = np.isfinite(motion).all((1, 2, 3))
+    if not finite.all():
+        raise Diverged(
+            f"{names[int(np.argmin(finite))]}: the engine {engine} left the numbers; "
+            "check its masses, radii, frictions and path."
+        )

@@ -20,6 +20,8 @@ from sainet.datasets.writer import (
     write_chunk,
 )
 from sainet.engines import make_assumed_engine, make_engine
+from sainet.engines.bullet.engine import MOST_DISKS, BulletEngine
+from sainet.errors import require_option
 from sainet.processes import each_done
 from sainet.runs import open_run
 
@@ -46,8 +48,10 @@ def generate(
 
     Raises:
         RunConflict: the folder holds something else.
-        BadInput: the disk is full, or a scene has no room for its disks.
+        BadInput: the disk is full, a scene has no room for its disks, or an engine
+            cannot have as many.
         MissingExtra: an engine needs a package that is not installed.
+        Diverged: an engine left the numbers.
     """
     _check_possible(config)
     folder = open_run(
@@ -70,10 +74,13 @@ def generate(
 
 def _check_possible(config: GenerateConfig) -> None:
     """Raise before anything is written: an engine may be missing, or room for disks."""
-    make_engine(config.engine)
-    for name in config.assumed_engine:
-        make_assumed_engine(name)
-    draw(config, chunk_generator(config.seed, 0), config.chunk_size)
+    engines = [make_engine(config.engine)]
+    engines += [make_assumed_engine(name).engine for name in config.assumed_engine]
+    if any(isinstance(engine, BulletEngine) for engine in engines):
+        wanted = f"at most {MOST_DISKS} with the engine bullet"
+        require_option(config.disks <= MOST_DISKS, "disks", wanted, config.disks)
+    for index in range(store_info(config).chunks):
+        draw(config, chunk_generator(config.seed, index), config.chunk_size)
 
 
 def make_chunk(config: GenerateConfig, out: Path, index: int) -> int:

@@ -76,9 +76,9 @@ def to_arrays(
     arrays["truth_pusher"] = arrays["command_position"]
     if log.plan is not None:
         arrays["repeat"] = numbered(log.plan)
-    return arrays | {
-        simulated_name(ASSUMED_ENGINE): simulate(ASSUMED_ENGINE, arrays, info)
-    }
+    names = [f"{log.path}: {place}" for place in log.places]
+    motion = simulate(ASSUMED_ENGINE, arrays, info, names)
+    return arrays | {simulated_name(ASSUMED_ENGINE): motion}
 
 
 def _ends(log: EndpointLog, info: StoreInfo) -> dict[str, np.ndarray]:

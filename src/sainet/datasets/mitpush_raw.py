@@ -84,7 +84,7 @@ def _read(
         hashes[file.name] = content_hash(data)
         try:
             push = read_motion(file.name, data, motion.group)
-            pushes.append(replace(push, plan=motion.plan))
+            pushes.append(replace(push, name=str(file), plan=motion.plan))
         except Unusable as reason:
             skipped[str(reason)] += 1
             _log.warning("%s is left out: %s", file, reason)

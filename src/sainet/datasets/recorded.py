@@ -12,13 +12,19 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
+from sainet.datasets.batch import (
+    check_finite,
+    from_trajectory,
+    to_controls,
+    to_initial,
+    to_scene,
+)
 from sainet.datasets.schema import StoreInfo
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import HASHES
 from sainet.engines import make_assumed_engine
 from sainet.engines.base import roll_out
-from sainet.errors import BadInput, Diverged
+from sainet.errors import BadInput
 from sainet.runs import CONFIG, open_run, write_error
 
 _log = logging.getLogger(__name__)
@@ -33,11 +39,11 @@ def check_frictions(contact_friction: float, table_friction: float) -> None:
     Raises:
         BadInput: one is negative or no number.
     """
-    for name, value in {"contact": contact_friction, "table": table_friction}.items():
+    # No command has an option for the second: whoever calls from Python set it.
+    options = {"--contact-friction": contact_friction, "table_friction": table_friction}
+    for name, value in options.items():
         if not 0 <= value < float("inf"):
-            raise BadInput(
-                f"--{name}-friction is {value}; it must be zero or positive."
-            )
+            raise BadInput(f"{name} is {value}; it must be zero or positive.")
 
 
 def make_once(
@@ -62,7 +68,7 @@ def make_once(
 
 
 def simulate(
-    name: str, arrays: dict[str, np.ndarray], info: StoreInfo
+    name: str, arrays: dict[str, np.ndarray], info: StoreInfo, pushes: Sequence[str]
 ) -> Float[np.ndarray, "push time body 6"]:
     """Return s-bar: what an engine predicts with the properties that it assumes.
 
@@ -70,6 +76,7 @@ def simulate(
         name: of the assumed engine.
         arrays: scenes, starts and controls of some pushes, by variable name.
         info: of their store.
+        pushes: what their file calls each of them.
 
     Raises:
         Diverged: the engine left the numbers.
@@ -78,9 +85,7 @@ def simulate(
     engine = make_assumed_engine(name)
     trajectory = roll_out(engine, scene, initial, to_controls(arrays, info))
     motion, _ = from_trajectory(trajectory)
-    if not np.isfinite(motion).all():
-        push = int(np.argmin(np.isfinite(motion).all((1, 2, 3))))
-        raise Diverged(f"{name} left the numbers in push {push}.")
+    check_finite(name, motion, pushes)
     return motion
 
 

@@ -109,8 +109,9 @@ def chunk_arrays(
         "rate_observed": np.all(finite[..., 3:], axis=(-2, -1)),
         "truth_pusher": known["command_position"],
     }
+    names = [push.name for push in pushes]
     simulated = {
-        simulated_name(engine): simulate(engine, arrays, info)
+        simulated_name(engine): simulate(engine, arrays, info, names)
         for engine in info.assumed_engines
     }
     return arrays | simulated

@@ -28,6 +28,7 @@ class RecordedPush:
     initial_pusher: Float[np.ndarray, "2"]  # m
     pusher: Float[np.ndarray, "time 2"]  # m
     pusher_velocity: Float[np.ndarray, "time 2"]  # m/s
+    name: str = ""  # what its file calls it, with the file
     plan: str = ""  # alike of pushes that were meant to be; empty where nobody says
 
     @property

@@ -4,7 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from sainet.datasets.batch import from_trajectory
+from sainet.datasets.batch import check_finite, from_trajectory
 from sainet.datasets.config import GenerateConfig, bounds
 from sainet.datasets.sampling import Draws, chunk_generator, draw
 from sainet.datasets.schema import StoreInfo, simulated_name
@@ -59,6 +59,9 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     """Return every array of one chunk of the store.
 
     The chunk depends on the settings and its index alone, never on who makes it.
+
+    Raises:
+        Diverged: an engine left the numbers.
     """
     info = store_info(config)
     part = info.chunk_slice(index)
@@ -89,7 +92,12 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
         "rate_observed": np.ones(pose.shape[:2]),
         **simulated,
     }
-    return {name: value[:pushes] for name, value in arrays.items()}
+    arrays = {name: value[:pushes] for name, value in arrays.items()}
+    names = [f"push {number} of the dataset" for number in range(part.start, part.stop)]
+    check_finite(config.engine, arrays["truth"], names)
+    for name in config.assumed_engine:
+        check_finite(name, arrays[simulated_name(name)], names)
+    return arrays
 
 
 def _longest(config: GenerateConfig) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Rows of a table put together to pushes; what cannot be is refused with its row."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -56,13 +56,14 @@ def to_pushes(table: TableRows, properties: BodyProperties) -> list[RecordedPush
     """
     _check_units(table)
     pushes = []
-    for push, sequences in _by_push(table, properties):
-        name = f"push {table.names['push'][push][:40]!r}"
+    for code, sequences in _by_push(table, properties):
+        name = f"push {table.names['push'][code][:40]!r}"
         _check_together(table, name, properties, sequences)
         for body, sequence in sequences.items():
             _check_motion(table, name, sequence, _radius(properties, body))
         _check_overlaps(table, name, properties, sequences)
-        pushes.append(_push(table, name, list(sequences.values())))
+        push = _push(table, name, list(sequences.values()))
+        pushes.append(replace(push, name=f"{table.path}: {name}"))
     return pushes
 
 
