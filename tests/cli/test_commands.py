@@ -136,7 +136,7 @@ def test_train_and_evaluate(pushes, tmp_path):
 
 
 def test_shipped_networks_are_compared_where_they_fit(pushes):
-    words = ("evaluate", "--data", pushes, "--steps", 5, "--json")
+    words = ("evaluate", "--data", pushes, "--steps", 5, "--json", "--quiet")
     done = sainet(*words)
     assert {row["model"] for row in json.loads(done.stdout)["rows"]} == {
         "physics",

@@ -7,7 +7,9 @@ import sys
 import pytest
 from selenium.webdriver.support.ui import WebDriverWait
 
-from sainet.errors import UnknownName
+from sainet.cli.output import Output
+from sainet.cli.reproduce import Reproduce
+from sainet.errors import BadInput, MissingExtra, UnknownName
 from sainet.experiments import EXPERIMENTS, load_experiment
 from sainet.experiments.published import ROBOT_TWO_DISKS, published_rows
 from support import SOURCE
@@ -53,6 +55,46 @@ def test_an_unknown_experiment_lists_the_known():
     with pytest.raises(UnknownName, match="robot-planar"):
         load_experiment("table-9")
     assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
+
+
+@pytest.fixture
+def begun(monkeypatch):
+    """The folders of the experiments that were begun; those below do nothing."""
+    folders = []
+    for name in ("robot_planar", "fine_tuning"):
+        monkeypatch.setattr(
+            f"sainet.experiments.{name}.run",
+            lambda scale, chain: folders.append(chain.out.name) or {"rows": []},
+        )
+    monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
+    return folders
+
+
+@pytest.mark.parametrize(
+    ("second", "error", "says"),
+    [
+        ("table-9", UnknownName, "table-9"),
+        ("recorded-pushes", BadInput, "--recorded is missing"),
+        ("engine-parity", MissingExtra, "PyBullet"),
+    ],
+)
+def test_what_cannot_be_made_is_said_before_anything_runs(
+    second, error, says, begun, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    with pytest.raises(error, match=says):
+        Reproduce(experiments=("robot-planar", second)).run()
+    assert begun == []
+
+
+def test_all_that_can_be_made_is_told_even_when_quiet(begun, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    Reproduce(output=Output(quiet=True)).run()
+    assert begun == ["robot-planar-quick", "fine-tuning-quick"]
+    recorded, bullet = capsys.readouterr().err.splitlines()
+    told = "recorded-pushes, recorded-data-efficiency."
+    assert recorded == f"Left out without --recorded: {told}"
+    assert bullet.startswith("Left out without PyBullet: direct-force-two-disks, ")
 
 
 def test_the_help_names_every_experiment():

@@ -76,5 +76,5 @@ class Evaluate:
                     model.check_fits(info.kind, info.time_step, seed=info.seed)
                 names.append(name)
             except (BadCheckpoint, MissingExtra) as error:
-                self.output.say(f"Left out: {name}. {error}")
+                self.output.warn(f"Left out: {name}. {error}")
         return names

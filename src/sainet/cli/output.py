@@ -30,6 +30,10 @@ class Output:
         if not self.quiet:
             self.console.print(text)
 
+    def warn(self, text: str) -> None:
+        """Say what the result lacks, quiet or not: it is no progress."""
+        print(text, file=sys.stderr)
+
 
 def finish(result: dict[str, Any], output: Output) -> None:
     """Print the result of a command as JSON if that was asked for."""

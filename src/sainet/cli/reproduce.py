@@ -1,9 +1,11 @@
 """`sainet reproduce`."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
@@ -12,6 +14,9 @@ from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.experiments.config import Scale
 from sainet.processes import worker_pool
+
+if TYPE_CHECKING:
+    from sainet.experiments.chain import Chain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +43,6 @@ class Reproduce:
     def run(self) -> dict[str, Any]:
         """Run the experiments one after another."""
         use_devices(self.devices)
-        from sainet.experiments import EXPERIMENTS, load_experiment
         from sainet.experiments.chain import Chain
         from sainet.viz.control_table import is_control, print_control
         from sainet.viz.tables import print_table
@@ -46,19 +50,39 @@ class Reproduce:
         tables: dict[str, Any] = {}
         bar = partial(progress_bar, output=self.output)
         with worker_pool(None) as pool:
-            for name in self.experiments or self._possible(tuple(EXPERIMENTS)):
-                folder = self.out / f"{name}-{self.scale}"
-                chain = Chain(folder, pool, self.output.say, bar, self.recorded)
-                tables[name] = load_experiment(name)(self.scale, chain)
+            chain = Chain(self.out, pool, self.output.say, bar, self.recorded)
+            for name, make in self._look_up(chain).items():
+                own = replace(chain, out=self.out / f"{name}-{self.scale}")
+                tables[name] = make(self.scale, own)
                 show = print_control if is_control(tables[name]) else print_table
                 show(tables[name], self.output.console)
         only = next(iter(tables.values()))
         return only if len(tables) == 1 else {"experiments": tables}
 
-    def _possible(self, experiments: tuple[str, ...]) -> tuple[str, ...]:
-        """Leave out what needs recorded pushes where none were given, and say so."""
-        if self.recorded is not None:
-            return experiments
-        needy = [name for name in experiments if name.startswith("recorded-")]
-        self.output.say(f"Left out without --recorded: {', '.join(needy)}.")
-        return tuple(name for name in experiments if name not in needy)
+    def _look_up(self, chain: "Chain") -> dict[str, Callable[..., dict[str, Any]]]:
+        """Return what makes each table; what cannot be had is said before any runs."""
+        from sainet.engines import make_engine
+        from sainet.experiments import load_experiment, needs_bullet, needs_recorded
+
+        names = self.experiments or self._possible()
+        found = {name: load_experiment(name) for name in names}
+        if any(map(needs_bullet, names)):
+            make_engine("bullet")
+        if any(map(needs_recorded, names)):
+            chain.recorded_pushes()
+        return found
+
+    def _possible(self) -> tuple[str, ...]:
+        """Return what can be made here, and say what cannot."""
+        from sainet.experiments import EXPERIMENTS, needs_bullet, needs_recorded
+
+        names = tuple(EXPERIMENTS)
+        for lacks, lacking, needs in (
+            (self.recorded is None, "--recorded", needs_recorded),
+            (find_spec("pybullet") is None, "PyBullet", needs_bullet),
+        ):
+            left = [name for name in names if lacks and needs(name)]
+            if left:
+                self.output.warn(f"Left out without {lacking}: {', '.join(left)}.")
+            names = tuple(name for name in names if name not in left)
+        return names

@@ -21,6 +21,19 @@ EXPERIMENTS = {
     "recorded-pushes": "sainet.experiments.recorded_pushes:run",
     "recorded-data-efficiency": "sainet.experiments.recorded_efficiency:run",
 }
+# What the others need beyond the base install.
+_ON_BASE_INSTALL = ("robot-planar", "fine-tuning")
+_RECORDED = ("recorded-pushes", "recorded-data-efficiency")
+
+
+def needs_recorded(name: str) -> bool:
+    """Return whether an experiment needs recorded pushes."""
+    return name in _RECORDED
+
+
+def needs_bullet(name: str) -> bool:
+    """Return whether an experiment needs PyBullet."""
+    return name not in (*_ON_BASE_INSTALL, *_RECORDED)
 
 
 def load_experiment(name: str) -> Callable[..., dict[str, Any]]:
