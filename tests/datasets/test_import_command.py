@@ -36,6 +36,16 @@ def test_physics_is_evaluated_on_what_was_imported(
     assert all(row["n"] == 1 and 0 < row["pos_mm"] < 100 for row in found)
 
 
+def test_a_folder_that_cannot_be_made_is_one_line(
+    sources, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+):
+    out = tmp_path / ("x" * 300)
+    assert run(["import", "mitpush", *sources["mitpush"], "--out", str(out)]) == 2
+    error = capfd.readouterr().err
+    assert f"sainet: {out}: cannot be read" in error
+    assert len(error.splitlines()) == 1
+
+
 @pytest.mark.parametrize(
     ("words", "wanted"),
     [

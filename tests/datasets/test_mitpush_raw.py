@@ -1,6 +1,8 @@
 """The raw MIT Push dataset: files with every trap, and the motion that is known."""
 
+import fcntl
 import json
+import os
 import zipfile
 from collections import Counter
 from pathlib import Path
@@ -337,6 +339,30 @@ def test_the_same_input_gives_the_same_bytes_and_other_input_is_refused(
     with pytest.raises(RunConflict, match="source_sha256"):
         import_mitpush(path, tmp_path / "one")
     assert contents(tmp_path / "one") == before
+
+
+def test_an_import_does_not_read_what_it_wrote(tmp_path: Path):
+    pack(tmp_path / "ellip1_json.zip", good())
+    out = tmp_path / "runs" / "mit"
+    killed = out.with_name(".mit.0.partial")
+    killed.mkdir(parents=True)
+    (killed / "config.json").write_text("{}")
+    for _ in range(2):
+        import_mitpush(tmp_path, out)
+    assert skipped(out) == {}
+
+
+def test_what_killed_imports_left_is_removed_and_what_lives_is_not(tmp_path: Path):
+    path = pack(tmp_path / "ellip1_json.zip", good())
+    killed, alive = (tmp_path / f".out.{number}.partial" for number in range(2))
+    killed.mkdir()
+    (killed / "config.json").write_text("{}")
+    alive.mkdir()
+    descriptor = os.open(alive, os.O_RDONLY)
+    fcntl.flock(descriptor, fcntl.LOCK_EX)
+    import_mitpush(path, tmp_path / "out")
+    os.close(descriptor)
+    assert {each.name for each in tmp_path.iterdir()} == {path.name, alive.name, "out"}
 
 
 def test_a_friction_that_cannot_be_is_refused(tmp_path: Path):

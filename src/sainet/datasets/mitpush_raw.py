@@ -15,6 +15,7 @@ from sainet.datasets.recorded import (
     TABLE_FRICTION,
     check_frictions,
     make_once,
+    partial_folders,
 )
 from sainet.datasets.recorded_arrays import (
     ASSUMED_ENGINES,
@@ -54,8 +55,9 @@ def import_mitpush(
         BadInput: a friction is negative or no number, or the disk is full.
     """
     check_frictions(contact_friction, table_friction)
-    path = Path(path)
-    motions, skipped = choose(list_files(path))
+    path, own = Path(path), _written_below(Path(path), Path(out))
+    files = [f for f in list_files(path) if own.isdisjoint(f.path.resolve().parents)]
+    motions, skipped = choose(files)
     pushes, digest = _read(motions, skipped)
     for reason, count in sorted(skipped.items()):
         _log.warning("%s: %d skipped: %s", path, count, reason)
@@ -72,6 +74,12 @@ def import_mitpush(
     return make_once(
         Path(out), config, lambda folder: write_pushes(folder, pushes, scene)
     )
+
+
+def _written_below(path: Path, out: Path) -> set[Path]:
+    """Return the folders below `path` in which imports to `out` keep files."""
+    own = {out.resolve(), *partial_folders(out)}
+    return {folder for folder in own if path.resolve() in folder.parents}
 
 
 def _read(

@@ -1,5 +1,7 @@
 """What importers of recorded pushes share: frictions, s-bar, a folder made whole."""
 
+import fcntl
+import glob
 import logging
 import os
 import shutil
@@ -25,7 +27,7 @@ from sainet.datasets.writer import HASHES
 from sainet.engines import make_assumed_engine
 from sainet.engines.base import roll_out
 from sainet.errors import BadInput
-from sainet.runs import CONFIG, open_run, write_error
+from sainet.runs import CONFIG, open_run, readable, write_error
 
 _log = logging.getLogger(__name__)
 
@@ -97,12 +99,45 @@ def numbered(plans: Sequence[Hashable]) -> Int[np.ndarray, " push"]:
 
 def _is_finished(out: Path, config: dict[str, Any]) -> bool:
     """Whether the folder holds this very store; a folder of other things is refused."""
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
-        return False
+    with readable(out):
+        if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+            return False
     finished = open_run(out, config, finished_by=HASHES).is_finished
     if finished:
         _log.info("%s is finished already", out)
     return finished
+
+
+def partial_folders(out: Path) -> list[Path]:
+    """Return the folders in which imports to `out` work, or were killed."""
+    place = out.resolve()
+    named = f".{glob.escape(place.name)}.*.partial"
+    return [path for path in place.parent.glob(named) if path.is_dir()]
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[bool]:
+    """Hold a folder's lock, which the system lets go of even after `kill -9`.
+
+    Gives whether it is held: another import may have it, or the disk knows no locks.
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        is_held = True
+    except OSError:
+        is_held = False
+    try:
+        yield is_held
+    finally:
+        os.close(descriptor)
+
+
+def _remove_abandoned(out: Path) -> None:
+    for folder in partial_folders(out):
+        with _held(folder) as is_held:
+            if is_held:
+                shutil.rmtree(folder)
 
 
 @contextmanager
@@ -111,7 +146,10 @@ def _whole_or_nothing(out: Path) -> Iterator[Path]:
     place = out.resolve()
     folder = place.with_name(f".{place.name}.{uuid.uuid4().hex}.partial")
     try:
-        yield folder
+        _remove_abandoned(out)
+        folder.mkdir(parents=True)
+        with _held(folder):
+            yield folder
         # Only of a damaged store of the same settings: all of it was made again.
         if (place / CONFIG).is_file():
             shutil.rmtree(place)
