@@ -78,6 +78,18 @@ def test_what_is_missing_is_named(tmp_path, monkeypatch, words, names):
     assert not list(tmp_path.glob("x"))
 
 
+@pytest.mark.parametrize(
+    "words",
+    [("report", "{}"), ("import", "table", "{}", "--properties", "{}", "--out", "x")],
+)
+def test_a_path_that_cannot_be_is_one_line(words):
+    path = "x" * 300
+    error = sainet(*(word.format(path) for word in words), status=2).stderr
+    assert error.startswith(f"sainet: {path}")
+    assert len(error.splitlines()) == 1
+    assert "File name too long" in error
+
+
 def test_an_unknown_command_is_a_usage_error():
     sainet("fly", status=2)
 

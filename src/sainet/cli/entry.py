@@ -21,7 +21,7 @@ from sainet.cli.output import finish
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.train import Train, going_on
-from sainet.errors import SainetError
+from sainet.errors import BadInput, SainetError
 
 
 def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
@@ -98,4 +98,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        if error.filename is None:
+            raise
+        # A name that is too long, or a folder that nobody lets us into.
+        reason = f"{error.filename}: {error.strerror}; give another path."
+        print(f"sainet: {reason}", file=sys.stderr)
+        return BadInput.exit_status
     return 0
