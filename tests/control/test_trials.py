@@ -1,6 +1,7 @@
 """Trials: seeded, resumable, the same goals for every model."""
 
 import json
+import math
 import runpy
 import shutil
 import signal
@@ -267,6 +268,7 @@ def test_a_network_for_other_controls_is_refused(tmp_path):
         *(("trials", 0), ("pushes", 0), ("disks", 1), ("seed", -1)),
         *(("tolerance", 0.0), ("tolerance", 1.5), ("alignment", -1.0)),
         *(("deadline", 0.0), ("aim", 0.0), ("aim", 1.1)),
+        *(("deadline", math.inf), ("alignment", math.inf), ("alignment", math.nan)),
     ],
 )
 def test_bad_settings_name_their_option(name, value):

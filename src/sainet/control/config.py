@@ -1,5 +1,6 @@
 """Settings of control trials, free of JAX."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -56,6 +57,7 @@ class ControlConfig:
             0 < self.tolerance < 1, "tolerance", "between 0 and 1", self.tolerance
         )
         require_option(0 < self.aim <= 1, "aim", "above 0, at most 1", self.aim)
-        require_option(self.alignment >= 0, "alignment", "0 or more", self.alignment)
-        late = self.deadline is None or self.deadline > 0
-        require_option(late, "deadline", "positive", self.deadline)
+        aligned = 0 <= self.alignment < math.inf
+        require_option(aligned, "alignment", "0 or more, finite", self.alignment)
+        late = self.deadline is None or 0 < self.deadline < math.inf
+        require_option(late, "deadline", "positive and finite", self.deadline)
