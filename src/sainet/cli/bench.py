@@ -27,6 +27,8 @@ class Bench:
             have figures of one name.
         """
         use_devices(self.devices)
+        from rich.text import Text
+
         from sainet.bench import CASES, load_case
 
         # Every name is looked up before anything is measured.
@@ -36,5 +38,6 @@ class Bench:
             self.output.say(f"Measuring {name} ...")
             figures[name] = case()
             for key, value in figures[name].items():
-                self.output.console.print(f"  {key}: {value}")
+                told = Text(f"  {key}: {value}")  # a value may look like markup
+                self.output.console.print(told, soft_wrap=True)
         return figures if len(figures) > 1 else next(iter(figures.values()))

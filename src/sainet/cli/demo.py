@@ -32,7 +32,8 @@ class Demo:
 
         with worker_pool(None) as pool:
             bar = partial(progress_bar, output=self.output)
-            chain = Chain(self.out, pool, self.output.say, bar)
+            say = partial(self.output.say, markup=True)
+            chain = Chain(self.out, pool, say, bar)
             result = run_demo(self.config, chain)
         print_table(result.table, self.output.console)
         self.output.say(f"Open {result.report} in a browser: it plays.")

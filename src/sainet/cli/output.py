@@ -25,10 +25,15 @@ class Output:
 
         return Console(stderr=self.json, highlight=False)
 
-    def say(self, text: str) -> None:
-        """Say what is being done, unless quiet."""
+    def say(self, text: str, *, markup: bool = False) -> None:
+        """Say what is being done, unless quiet.
+
+        Args:
+            text: a line; it is not broken, for it may hold a command to copy.
+            markup: whether brackets are Rich's markup; in a path they are its own.
+        """
         if not self.quiet:
-            self.console.print(text)
+            self.console.print(text, markup=markup, soft_wrap=True)
 
     def warn(self, text: str) -> None:
         """Say what the result lacks, quiet or not: it is no progress."""

@@ -37,12 +37,12 @@ def progress_bar(title: str, total: int | None, output: Output) -> Iterator[Adva
             return Text(f"{speed:.1f}/s" if speed else "", style="cyan")
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         Rate(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
     )
     bar = Progress(*columns, console=Console(stderr=True), disable=output.quiet)
     with bar:
