@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from sainet.processes import core_count
+from sainet.errors import SainetError
+from sainet.processes import core_count, each_done, worker_pool
 
 # Jobs that write where they began and, when they are interrupted, what they keep.
 JOBS = """
@@ -71,6 +72,15 @@ def test_an_interruption_is_quiet_ends_what_is_under_way_and_begins_no_more(
     assert (said, complaints, child.returncode) == ("interrupted\n", "", 0)
     assert len(list(tmp_path.glob("began-[0-9]"))) == under_way
     assert len(list(tmp_path.glob("kept-[0-9]"))) == under_way
+
+
+def test_a_worker_that_is_ended_is_told_of_and_the_way_out():
+    with (
+        pytest.raises(SainetError, match="want of memory.*fewer workers") as told,
+        worker_pool(1) as pool,
+    ):
+        list(each_done(pool, os._exit, [(1,), (2,)]))
+    assert told.value.exit_status == 1
 
 
 def test_cores_are_counted_where_affinity_is_unknown(monkeypatch):

@@ -6,11 +6,12 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, final
 
-from sainet.errors import BadInput
+from sainet.errors import BadInput, SainetError
 
 
 def core_count() -> int:
@@ -122,18 +123,32 @@ def each_done(
         executor: does the jobs; None does them here, one by one.
         work: a function of a module; it returns the index of its job.
         jobs: the arguments of each call.
+
+    Raises:
+        SainetError: a worker was ended from outside.
     """
     if executor is None:
         for job in jobs:
             yield work(*job)
         return
-    futures = [executor.submit(work, *job) for job in jobs]
+    futures = []
     try:
+        futures += [executor.submit(work, *job) for job in jobs]
         for future in as_completed(futures):
             yield future.result()
+    except BrokenProcessPool:
+        raise worker_lost() from None
     finally:
         for future in futures:
             future.cancel()
+
+
+def worker_lost() -> SainetError:
+    """Say that a worker of a pool was ended, most often by a system out of memory."""
+    return SainetError(
+        "a worker process was ended, probably for want of memory; the same command "
+        "goes on from here: give it fewer workers or smaller chunks."
+    )
 
 
 def end_with_parent() -> None:

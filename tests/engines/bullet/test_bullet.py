@@ -1,7 +1,9 @@
 """What is Bullet's own: its bits, its processes, its friction, and life without it."""
 
+import os
 import subprocess
 import sys
+from concurrent.futures import wait
 from importlib.util import find_spec
 
 import equinox as eqx
@@ -14,7 +16,8 @@ from contracts.worlds import far_away, make_scene, moving, pushed, rows
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
-from sainet.errors import BadScene, MissingExtra
+from sainet.engines.bullet import pool
+from sainet.errors import BadScene, MissingExtra, SainetError
 from sainet.scene import GRAVITY, FrictionField
 from support import require
 
@@ -49,6 +52,15 @@ def test_other_processes_give_the_same_bits():
         part = slice(row, row + 1)
         alone = roll_out(make_engine("bullet"), *rows(many, part)).states
         assert same_bits(alone, rows(together, part))
+
+
+def test_a_process_that_was_ended_is_told_of_and_replaced():
+    many = pushed(GenerateConfig(disks=1, pushes=9), 3, 2)
+    before = roll_out(make_engine("bullet"), *many).states
+    wait([pool._pool().submit(os._exit, 1)])
+    with pytest.raises(SainetError, match="a worker process was ended"):
+        roll_out(make_engine("bullet"), *many)
+    assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
 
 
 def test_a_friction_field_slows_each_disk_where_it_is():
