@@ -178,5 +178,7 @@ def test_manifests_are_the_same_tomorrow_and_elsewhere(tmp_path, monkeypatch):
     assert first["devices"] == 2
     assert first["format_version"] == 1
     assert first["versions"]["jax"]
+    assert first["versions"]["scipy"]
+    assert "pybullet" in first["versions"]  # None where it is not installed
     assert not re.search(r"20\d\d-\d\d|\d\d:\d\d", json.dumps(first))
     assert os.uname().nodename not in json.dumps(first)

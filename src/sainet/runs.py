@@ -188,10 +188,10 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
 
 def manifest(devices: int = 0) -> dict[str, Any]:
     """Return by what a run was made: versions, commit and hardware, no dates."""
-    names = ("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "zarr")
+    names = ("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr")
     return {
         "format_version": FORMAT_VERSION,
-        "versions": {name: _version(name) for name in names},
+        "versions": {name: _version(name) for name in (*names, "pybullet")},
         "git_commit": _git_commit(),
         "python": platform.python_version(),
         "machine": platform.machine(),

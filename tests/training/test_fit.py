@@ -201,6 +201,9 @@ def test_going_on_where_the_bits_would_differ_warns(store, tmp_path, monkeypatch
     started(store, tmp_path, monkeypatch)
     started(store, tmp_path, monkeypatch)  # the same machine: no warning
     found = json.loads((tmp_path / MANIFEST).read_text())
+    del found["versions"]["scipy"]  # older manifests do not name it: no warning
+    (tmp_path / MANIFEST).write_text(json.dumps(found))
+    started(store, tmp_path, monkeypatch)
     (tmp_path / MANIFEST).write_text(json.dumps(found | {name: "other"}))
     with pytest.warns(UserWarning, match=f"{name} was other"):
         started(store, tmp_path, monkeypatch)

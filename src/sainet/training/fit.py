@@ -137,6 +137,9 @@ def _start(name: str | None) -> Start | None:
 
 def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
     before, now = read_json(folder.path / MANIFEST), manifest(devices)
+    known = before.get("versions")
+    if isinstance(known, dict):  # manifests once named fewer packages
+        now["versions"] = {k: v for k, v in now["versions"].items() if k in known}
     for name in ("versions", "processor", "devices"):
         if before.get(name) != now[name]:
             warnings.warn(
