@@ -119,6 +119,21 @@ def test_where_ends_alone_are_known_nothing_is_said_twice():
     assert printed(alone).count("−1.000") == 1
 
 
+def test_physics_is_compared_with_where_nothing_better_informed_is():
+    told = [
+        {"model": "sain", "against": against, "group": None, "body": 1}
+        | {"metric": "pos_mm", "difference": -1.0, "interval": None}
+        for against in ("physics", "physics-calibrated", "in")
+    ]
+    rows = {name: samples.row(name, 1, 0.5) for name in ("physics", "in", "sain")}
+    without = printed({"rows": [*rows.values()], "comparisons": [told[0], told[2]]})
+    assert "SAIN minus Physics: pos" in without
+    rows["physics-calibrated"] = samples.row("physics-calibrated", 1, 0.5)
+    beside = printed({"rows": [*rows.values()], "comparisons": told})
+    assert "SAIN minus Physics, calibrated: pos" in beside
+    assert "SAIN minus Physics: pos" not in beside
+
+
 def test_nothing_at_all_is_said_in_words():
     for text in (to_html({"rows": []}), to_markdown({"rows": []}), printed({})):
         assert "Nothing to show" in text

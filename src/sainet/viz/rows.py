@@ -138,12 +138,17 @@ def _are_ends_alone(rows: Sequence[Mapping[str, Any]]) -> bool:
 def _worth_saying(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the comparisons that a reader has to see; the JSON holds them all.
 
-    Everything beats physics with wrong properties, and the end of a push tells what
-    its mean tells; where nothing else was compared, these are kept.
+    Beside physics that knows masses and radii, a comparison with physics that does not
+    tells little, and the end of a push tells what its mean tells; where nothing else
+    was compared, these are kept.
     """
     every: list[Mapping[str, Any]] = list(result.get("comparisons") or ())
+    models = {row["model"] for row in result.get("rows") or ()}
+    told_little = {"physics"} if "physics-calibrated" in models else set()
     telling = [
-        each for each in every if each["against"] != "physics" and not _is_of_end(each)
+        each
+        for each in every
+        if each["against"] not in told_little and not _is_of_end(each)
     ]
     return telling or [e for e in every if not _is_of_end(e)] or every
 
