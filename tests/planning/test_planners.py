@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from models.samples import quick_dynamics
-from planning.scenes import FEW, goal_ahead, scene, single, touching
+from planning.scenes import FEW, RADIUS, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
 from sainet.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.greedy import GreedyPlanner
+from sainet.planning.levels import flatten
 from sainet.planning.outcomes import every_push, roll_pushes
 from sainet.planning.tree import TreePlanner
 from sainet.pushes import PushGrid
@@ -165,6 +166,45 @@ def test_outcomes_are_those_of_single_predictions():
 
 def moved():
     return eqx.tree_at(lambda s: s.position, STATE, STATE.position + 0.03)
+
+
+def behind(contact_angle):
+    """The two disks, and a third one where that contact angle has its pusher."""
+    way = 0.5 + np.pi + contact_angle
+    place = STATE.position[0] + 2 * RADIUS[0] * single([np.cos(way), np.sin(way)])
+    position = jnp.concatenate([STATE.position, place[None]])
+    chain = eqx.tree_at(
+        lambda s: (s.mass, s.radius),
+        SCENE,
+        (single([0.9, 1.0, 1.0]), single([*RADIUS, RADIUS[0]])),
+    )
+    return chain, at_rest(position, jnp.zeros(3), single([0, 0]))
+
+
+def test_no_push_begins_inside_a_disk_nor_does_what_comes_after_one():
+    grid = jax.device_get(FEW.pushes())
+    chain, state = behind(grid.contact_angle.max())
+    blocked = grid.contact_angle == grid.contact_angle.max()
+    root = jax.tree.map(lambda x: np.asarray(x)[None], state)
+
+    def expand(states):
+        return every_push(PHYSICS, FAR, chain, states, grid)
+
+    first = flatten(expand(root), np.zeros((1, 0), int))
+    np.testing.assert_array_equal(np.isinf(first.cost), blocked)
+    second = first.grow(np.arange(6), expand)
+    assert not np.isfinite(second.cost[blocked[second.actions].any(axis=1)]).any()
+    assert np.isfinite(second.cost).any()
+
+
+@every_planner
+def test_what_only_a_pusher_inside_a_disk_could_do_is_not_planned(name):
+    planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
+    for angle in (-0.6, 0.6):
+        task = goal_ahead(0.17, angle)
+        side = planner.plan(PHYSICS, task, SCENE, STATE).pushes[0].contact_angle
+        plan = planner.plan(PHYSICS, task, *behind(side))
+        assert plan.pushes[0].contact_angle != side
 
 
 @every_planner

@@ -34,7 +34,11 @@ class Level:
     def grow(self, rows: Int[np.ndarray, " row"], expand: Expand) -> "Level":
         """Return what becomes of some sequences with every push after them."""
         states = jax.tree.map(lambda x: x[rows], self.outcomes.state)
-        return flatten(expand(states), self.actions[rows])
+        found, possible = expand(states), np.isfinite(self.cost[rows])[:, None]
+        # Nothing comes after a push that cannot be made.
+        cost, solved = np.where(possible, found.cost, np.inf), found.solved & possible
+        found = found._replace(cost=cost, solved=solved)
+        return flatten(found, self.actions[rows])
 
     def found(self, row: int, looked_at: int, *, is_complete: bool = True) -> Found:
         """Return one of the sequences as what a search ends with."""
@@ -78,6 +82,7 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     if not np.isfinite(best.cost.min()):
         raise Diverged(
             f"model: each of the {looked_at} pushes that it predicted left the finite "
-            "numbers; check the scene and the observation, or give another model."
+            "numbers, or would begin inside a disk; check the scene and the "
+            "observation, or give another model."
         )
     return best.found(int(best.cheapest(1)[0]), looked_at, is_complete=is_complete)

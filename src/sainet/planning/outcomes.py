@@ -10,11 +10,12 @@ from jaxtyping import Array, Bool, Float
 from sainet.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
 from sainet.pushes import Push, path_controls, place_pusher, push_direction
-from sainet.scene import Scene, State, Trajectory, at_rest
+from sainet.scene import Scene, State, Trajectory, at_rest, pusher_gaps
 from sainet.tasks.base import AbstractTask
 
 SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 
+_NEVER_IN_THE_WAY = 2  # disks: the second lies ahead of the first, the pusher behind
 _AT_ONCE = 1296  # rows: what a network makes of more of them leaves the cache
 
 
@@ -22,7 +23,7 @@ class Outcomes(NamedTuple):
     """Where pushes end, and what a task says of it; rest is taken for granted."""
 
     state: State  # everything at rest
-    cost: Float[Array, "*batch"]
+    cost: Float[Array, "*batch"]  # infinite: the push cannot be made
     distance: Float[Array, "*batch"]  # m
     solved: Bool[Array, "*batch"]
 
@@ -86,6 +87,15 @@ def _judge(
     scenes = batch_of(scene, states.angle.shape[0])
     end = roll_pushes(dynamics, scenes, states, pushes).final
     rest = at_rest(end.position, end.angle, end.pusher_position)
-    return Outcomes(
-        rest, task.cost(rest), task.distance(rest), task.is_solved(scenes, rest)
-    )
+    cost, solved = task.cost(rest), task.is_solved(scenes, rest)
+    if scene.body_count > _NEVER_IN_THE_WAY:
+        free = _has_room(scenes, states, pushes)
+        cost, solved = jnp.where(free, cost, jnp.inf), solved & free
+    return Outcomes(rest, cost, task.distance(rest), solved)
+
+
+def _has_room(scenes: Scene, states: State, pushes: Push) -> Bool[Array, " batch"]:
+    """Return whether the pusher would begin inside no disk."""
+    start = place_pusher(scenes, states, pushes)
+    initial = at_rest(states.position, states.angle, start)
+    return (pusher_gaps(scenes, initial)[..., 1:] >= 0).all(axis=-1)
