@@ -1,6 +1,7 @@
 """The figures are written whole, are the same each time, and survive odd input."""
 
 import dataclasses
+import re
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,6 +12,7 @@ from sainet.viz.figures import draw_error_over_time, draw_paths
 from sainet.viz.learning import draw_learning_curve, running_mean
 from sainet.viz.palette import css_variables, style_of, styles_of
 from sainet.viz.replay import Replay, Track
+from sainet.viz.templates import read
 from viz import samples
 
 HOSTILE = "<script>alert(1)</script> $x_{"
@@ -115,6 +117,35 @@ def test_unknown_models_get_colours_of_their_own():
         dark=True
     ).keys()
     assert len(style_of("runs/" + 60 * "x").label) <= 40
+
+
+def test_lines_are_told_apart_without_their_colours():
+    others = ("physics-calibrated", "in", "sain-bullet", "sain-calibrated")
+    styles = styles_of([*others, *(f"runs/{number}" for number in range(6))])
+    dashes = {style.dash for style in styles.values()}
+    assert len(dashes) == len(styles) == 10
+    assert () not in dashes  # truth, physics and SAIN
+
+
+def luminance(color):
+    """Of red, green and blue from 0 to 1, as the WCAG has it."""
+    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+    return linear @ (0.2126, 0.7152, 0.0722)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_faint_text_can_be_read(dark):
+    (percent,) = re.findall(r"--faint: color-mix.*?(\d+)%", read("report.css"))
+    colors = css_variables(dark=dark)
+    ink, paper = (
+        np.array(
+            [int(colors[name][start : start + 2], 16) / 255 for start in (1, 3, 5)]
+        )
+        for name in ("--ink", "--paper")
+    )
+    faint = paper + int(percent) / 100 * (ink - paper)
+    low, high = sorted([luminance(faint), luminance(paper)])
+    assert (high + 0.05) / (low + 0.05) >= 4.5  # AA
 
 
 def test_a_running_mean_is_of_the_losses_around(tmp_path):

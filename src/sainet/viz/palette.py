@@ -1,7 +1,8 @@
 """One colour, one dash and one label for each model, wherever it is drawn.
 
-The colours differ in hue and in lightness, so that they can be told apart without
-colour vision; each has a lighter twin for dark pages.
+Truth, physics and SAIN are solid lines, in ink and in an orange and a bluish green that
+common colour blindness tells apart; every other model has a dash of its own. Each
+colour has a lighter twin for dark pages.
 """
 
 import zlib
@@ -56,20 +57,20 @@ _KNOWN = {
     )
 }
 _SPARE = (
-    ("#8a5aa8", "#c39be0"),
-    ("#b8416f", "#ee85ab"),
-    ("#5b6b7f", "#a3b4c9"),
-    ("#8c4a2f", "#d6957a"),
-    ("#4453a6", "#9aa6ec"),
-    ("#7a7d1f", "#c3c76a"),
+    ("#8a5aa8", "#c39be0", (2, 1.5)),
+    ("#b8416f", "#ee85ab", (1, 1)),
+    ("#5b6b7f", "#a3b4c9", (6, 1.5, 1, 1.5)),
+    ("#8c4a2f", "#d6957a", (4, 1.5, 1, 1.5, 1, 1.5)),
+    ("#4453a6", "#9aa6ec", (9, 3)),
+    ("#7a7d1f", "#c3c76a", (2, 1, 2, 3)),
 )
 
 
 def styles_of(names: Iterable[str]) -> dict[str, ModelStyle]:
     """Return the style of each name, in order.
 
-    A model that the package does not know gets a spare colour chosen by its name,
-    or the next free one if another model here has it already.
+    A model that the package does not know gets a spare colour and its dash, chosen by
+    its name, or the next free ones if another model here has them already.
     """
     styles: dict[str, ModelStyle] = {}
     taken: set[int] = set()
@@ -89,7 +90,8 @@ def css_variables(*, dark: bool) -> dict[str, str]:
     """Return every colour of the palette by the name of its CSS variable."""
     ink, paper = (DARK_INK, DARK_PAPER) if dark else (INK, PAPER)
     pairs = [(style.color, style.dark) for style in _KNOWN.values()]
-    variables = {f"--model-{pair[0][1:]}": pair[dark] for pair in (*pairs, *_SPARE)}
+    pairs += [spare[:2] for spare in _SPARE]
+    variables = {f"--model-{pair[0][1:]}": pair[dark] for pair in pairs}
     disks = {name: pair[dark] for name, pair in _EPISODE.items()}
     return {"--ink": ink, "--paper": paper, **disks, **variables}
 
@@ -99,6 +101,6 @@ def _spare_style(name: str, taken: set[int]) -> ModelStyle:
     while slot in taken and len(taken) < len(_SPARE):
         slot = (slot + 1) % len(_SPARE)
     taken.add(slot)
-    color, dark = _SPARE[slot]
+    color, dark, dash = _SPARE[slot]
     label = name if len(name) <= _LONGEST else f"…{name[1 - _LONGEST :]}"
-    return ModelStyle(name, label, color, dark, (2, 1.5))
+    return ModelStyle(name, label, color, dark, dash)
