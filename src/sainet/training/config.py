@@ -36,7 +36,7 @@ class FitConfig:
     so many times less often. Predictions never hold it; other networks are never
     held."""
     recurrent: bool = True
-    """Train on whole pushes; otherwise on single steps, each from the true state (the
+    """On: train on whole pushes. Off: on single steps, each from the true state (the
     paper's figure 2c)."""
     seed: int = 0
     """Of the first weights and of the order of the pushes."""
@@ -60,8 +60,9 @@ class FitConfig:
     """Error of a push, as the terms measure it, from which it counts linearly and no
     longer squared, so that a few failed recordings do not rule; 0: nowhere."""
     mirror: bool = False
-    """Show about half of the pushes of each batch mirrored, others each time: disks on
-    an even table know no left and right. Not to networks that see the place."""
+    """On: about half of the pushes of each batch are shown mirrored, others each time,
+    for disks on an even table know no left and right; never to networks that see the
+    place. Off: all as they are."""
     average: int = 0
     """Iterations that the weights are averaged over, by an exponential mean: the mean
     is then the network. A long stroke feels every step of the weights, which jump about
