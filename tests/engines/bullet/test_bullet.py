@@ -16,7 +16,7 @@ from contracts.worlds import far_away, make_scene, moving, pushed, rows
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
-from sainet.engines.bullet import pool
+from sainet.engines.bullet import pool, world
 from sainet.errors import BadScene, MissingExtra, SainetError
 from sainet.scene import GRAVITY, FrictionField
 from support import require
@@ -98,6 +98,12 @@ def test_without_pybullet_the_way_out_is_named(version, wanted, monkeypatch):
     monkeypatch.setattr(sys, "version_info", (*version, 0))
     with pytest.raises(MissingExtra, match=wanted):
         make_engine("bullet")
+
+
+def test_bodies_are_told_never_to_sleep():
+    import pybullet
+
+    assert world._NEVER_SLEEPS == pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
 
 
 def test_nothing_is_printed():

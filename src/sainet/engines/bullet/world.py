@@ -24,7 +24,7 @@ _CLEARANCE = 0.0005  # m, between the table and the cylinder
 _HEIGHT = 0.02  # m, of a disk
 _GUIDED_MASS = 1000.0  # kg, of a pusher that nothing stops
 _PUSHABLE = 1  # collision group of disks and pusher; each disk's table has its own
-_NEVER_SLEEPS = 4  # pybullet.ACTIVATION_STATE_DISABLE_WAKEUP
+_NEVER_SLEEPS = 2  # pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
 
 
 class Driven(NamedTuple):
