@@ -92,7 +92,11 @@ def test_frictions_must_not_be_negative(name):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 @pytest.mark.parametrize(
-    "name", ["position", "angle", "velocity", "spin", "pusher_position"]
+    "name",
+    [
+        *("position", "angle", "velocity", "spin"),
+        *("pusher_position", "pusher_velocity"),
+    ],
 )
 def test_states_must_be_finite(name, value):
     check_state(STATE)

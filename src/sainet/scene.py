@@ -202,6 +202,7 @@ def check_scene(scene: Scene, source: str = "scene") -> None:
 
 def check_state(state: State, source: str = "state") -> None:
     """Raise `BadScene` if a pose or a velocity is not a finite number."""
-    for name in ("position", "angle", "velocity", "spin", "pusher_position"):
+    pusher = ("pusher_position", "pusher_velocity")
+    for name in ("position", "angle", "velocity", "spin", *pusher):
         if not np.isfinite(np.asarray(getattr(state, name))).all():
             raise BadScene(f"{source}: {name} holds NaN or infinity; remove that push.")
