@@ -52,6 +52,9 @@ def test_what_is_taken_decides_the_content(store):
     contents = {store.take(rows).content for rows in ([0, 1], [1, 0], [0, 2], [3])}
     assert len(contents) == 4
     assert store.take([0, 1]).content == store.first(2).content
+    assert store.take(range(12)).content == store.content
+    some = store.take([5, 3])
+    assert some.take([0, 1]).content == some.content
 
 
 @pytest.mark.parametrize(

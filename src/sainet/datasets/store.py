@@ -39,6 +39,8 @@ class Store:
     def take(self, rows: Iterable[int] | np.ndarray) -> "Store":
         """Return the store with some of its pushes alone, in that order.
 
+        All of them in their order are the store as it is, its content too.
+
         Raises:
             BadInput: there are none, or one is not there.
         """
@@ -51,6 +53,8 @@ class Store:
                 f"{self.path} has {self.info.pushes} pushes; there is no push "
                 f"{max(rows) if min(rows) >= 0 else min(rows)}."
             )
+        if rows == list(range(self.info.pushes)):
+            return self
         chosen = tuple(every[row] for row in rows)
         info = replace(self.info, pushes=len(chosen))
         return replace(self, info=info, rows=chosen)
