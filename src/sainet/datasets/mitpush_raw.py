@@ -18,7 +18,7 @@ from sainet.datasets.recorded import (
     partial_folders,
 )
 from sainet.datasets.recorded_arrays import (
-    ASSUMED_ENGINES,
+    STORED_ENGINES,
     SceneProperties,
     write_pushes,
 )
@@ -119,6 +119,6 @@ def _config(
         "source_sha256": digest,
         "observed": "poses all along each push; rates where they could be smoothed",
         "skipped": dict(skipped),
-        "assumed_engines": list(ASSUMED_ENGINES),
+        "assumed_engines": list(STORED_ENGINES),
         **scene.to_dict(),
     }

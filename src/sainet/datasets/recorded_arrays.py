@@ -13,7 +13,7 @@ from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk
 from sainet.scene import TIME_STEP
 
-ASSUMED_ENGINES = ("planar", "planar-calibrated")
+STORED_ENGINES = ("planar", "planar-calibrated")  # whose s-bar imports keep
 _CHUNK_SIZE = 250  # pushes
 _CHUNK_STEPS = 300_000  # of all bodies, so that chunks of long pushes stay small
 
@@ -89,7 +89,7 @@ def store_info(pushes: Sequence[RecordedPush]) -> StoreInfo:
         chunk_size=max(1, min(_CHUNK_SIZE, limit)),
         time_step=TIME_STEP,
         engine="recorded",
-        assumed_engines=ASSUMED_ENGINES,
+        assumed_engines=STORED_ENGINES,
         groups=tuple(sorted(named)),
         has_repeats=all(push.plan for push in pushes),
     )

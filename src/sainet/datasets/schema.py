@@ -25,7 +25,7 @@ class StoreInfo:
     chunk_size: int  # pushes
     time_step: float  # s
     engine: str  # that made the truth, or "recorded"
-    assumed_engines: tuple[str, ...] = ()  # with the paper's assumed properties
+    assumed_engines: tuple[str, ...] = ()  # whose s-bar is kept
     has_measurements: bool = False  # apart from the truth
     groups: tuple[str, ...] = ()  # names of the codes in `group`
     published: tuple[str, ...] = ()  # models whose published predictions are kept

@@ -10,7 +10,7 @@ import numpy as np
 from sainet.datasets.body_properties import BodyProperties, read_properties
 from sainet.datasets.recorded import make_once
 from sainet.datasets.recorded_arrays import (
-    ASSUMED_ENGINES,
+    STORED_ENGINES,
     SceneProperties,
     write_pushes,
 )
@@ -98,6 +98,6 @@ def _config(
         "source": path.name,
         "source_sha256": content_hash(data),
         "bodies": list(bodies.names),
-        "assumed_engines": list(ASSUMED_ENGINES),
+        "assumed_engines": list(STORED_ENGINES),
         **scene.to_dict(),
     }

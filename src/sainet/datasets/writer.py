@@ -1,7 +1,6 @@
 """Writing a store chunk by chunk; a list of hashes, written last, makes it whole."""
 
 import shutil
-import warnings
 from dataclasses import asdict
 from pathlib import Path
 
@@ -132,8 +131,7 @@ def clear_progress(folder: Path) -> None:
 
 def write_store(folder: Path, info: StoreInfo, arrays: dict) -> None:
     """Write a store that is already whole in memory."""
-    with warnings.catch_warnings():
-        create_arrays(folder, info)
+    create_arrays(folder, info)
     for index in range(info.chunks):
         part = {k: v[info.chunk_slice(index)] for k, v in arrays.items()}
         write_chunk(folder, info, index, part)
