@@ -1,11 +1,14 @@
 """The task of the paper, and its goals."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from planning.scenes import RADIUS, goal_ahead, scene, touching
+from sainet.errors import BadScene
 from sainet.geometry import rotate
 from sainet.scene import at_rest
 from sainet.tasks.goals import draw_goal
@@ -44,6 +47,15 @@ def test_solved_is_within_a_tenth_of_the_radius():
         assert bool(goal_ahead(distance).is_solved(scene(), touching())) is solved
     loose = goal_ahead(0.02, tolerance=0.5)
     assert bool(loose.is_solved(scene(), touching()))
+
+
+@pytest.mark.parametrize("moved", [2, -1])
+def test_a_disk_that_is_not_there_cannot_be_moved(moved):
+    task = goal_ahead(0.1, moved=moved)
+    is_solved = partial(task.is_solved, scene())
+    for judge in (task.distance, task.cost, is_solved):
+        with pytest.raises(BadScene, match=f"moved is {moved}, .* number of disks 2"):
+            judge(touching())
 
 
 def test_a_disk_that_left_the_finite_numbers_is_not_at_its_goal():

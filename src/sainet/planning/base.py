@@ -53,7 +53,8 @@ class AbstractPlanner(eqx.Module):
             state: as it was observed; it is taken to be at rest.
 
         Raises:
-            BadScene: the observation is not finite, or disks lie in one another.
+            BadScene: the observation is not finite, disks lie in one another, or the
+                task is about one that is not there.
             BadCheckpoint: the model is for another time step or for other controls.
             Diverged: whatever is pushed, the model leaves the finite numbers.
         """

@@ -4,6 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from sainet.errors import BadScene
 from sainet.geometry import norm
 from sainet.scene import Scene, State
 from sainet.tasks.base import AbstractTask
@@ -26,16 +27,17 @@ class PushToGoal(AbstractTask):
     alignment: float = eqx.field(static=True, default=ALIGNMENT)  # w, m
 
     def distance(self, state: State) -> Float[Array, "*batch"]:
-        """Return the distance of the moved disk from the goal (m)."""
-        return norm(self._to_goal(state.position[..., self.moved, :]))
+        """Return the distance of the moved disk from the goal (m).
+
+        Raises:
+            BadScene: there is no such disk.
+        """
+        return norm(self._to_goal(self._moved(state)))
 
     def cost(self, state: State) -> Float[Array, "*batch"]:
         """Return the paper's heuristic h(p_1, p_m, g) (m)."""
         pushed = state.position[..., 0, :]
-        ahead, wanted = (
-            state.position[..., self.moved, :] - pushed,
-            self._to_goal(pushed),
-        )
+        ahead, wanted = self._moved(state) - pushed, self._to_goal(pushed)
         lengths = jnp.maximum(norm(ahead) * norm(wanted), 1e-12)
         cosine = jnp.sum(ahead * wanted, axis=-1) / lengths
         return self.distance(state) + self.alignment * (1 - cosine)
@@ -43,6 +45,15 @@ class PushToGoal(AbstractTask):
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
         """Return whether the moved disk is within its tolerance of the goal."""
         return self.distance(state) <= self.tolerance * scene.radius[..., self.moved]
+
+    def _moved(self, state: State) -> Float[Array, "*batch 2"]:
+        # JAX would take the last disk for one that is not there.
+        if not 0 <= self.moved < state.body_count:
+            raise BadScene(
+                f"task: moved is {self.moved}, counted from 0, and the number of disks "
+                f"{state.body_count}; give the index of one of them."
+            )
+        return state.position[..., self.moved, :]
 
     def _to_goal(self, place: Float[Array, "*batch 2"]) -> Float[Array, "*batch 2"]:
         return jnp.broadcast_to(self.goal, place.shape) - place
