@@ -1,5 +1,6 @@
 """`sainet control`."""
 
+import shlex
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,13 +53,9 @@ class Control:
         if self.animate:
             self._animate(records[:_DRAWN])
         found = summarise(records)
-        low, high = found["interval"]
-        self.output.say(
-            f"{config.model}: {found['solved']} of {found['trials']} {config.goals} "
-            f"goals solved (95 % interval {low:.0%} to {high:.0%}), median "
-            f"{found['median_pushes']} pushes; episodes are in {self.out}, the first "
-            f"{_DRAWN} drawn in {figure}"
-        )
+        self.output.say(_outcome(config, found))
+        drawn = f"the first {_DRAWN}" if config.trials > _DRAWN else "each"
+        self.output.say(f"Episodes are in {self.out}, {drawn} drawn in {figure}.")
         names = {
             name: getattr(config, name)
             for name in ("model", "goals", "planner", "world")
@@ -85,12 +82,24 @@ class Control:
         self.output.say(f"{film} shows the first episode; {page} plays {len(records)}.")
 
 
+def _outcome(config: ControlConfig, found: dict[str, Any]) -> str:
+    """Say how many goals were reached, and how soon those that were."""
+    low, high = found["interval"]
+    pushes = found["median_pushes"]
+    return (
+        f"{config.model}: {found['solved']} of {found['trials']} {config.goals} goals "
+        f"solved (95 % interval {low:.0%} to {high:.0%})"
+        + ("." if pushes is None else f", with a median of {pushes:g} pushes.")
+    )
+
+
 def _command(config: ControlConfig) -> str:
     """Return the command that these settings come from."""
     usual = ControlConfig()
     told = [
-        f"--{name.replace('_', '-')} {value}"
+        word
         for name, value in asdict(config).items()
         if value != getattr(usual, name)
+        for word in (f"--{name.replace('_', '-')}", str(value))
     ]
-    return " ".join(["sainet control", *told, "--animate"])
+    return shlex.join(["sainet", "control", *told, "--animate"])

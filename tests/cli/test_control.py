@@ -1,0 +1,43 @@
+"""What `sainet control` says at the end, with episodes that cost nothing."""
+
+import shlex
+
+import pytest
+
+from sainet.cli import control
+from sainet.cli.control import Control
+from sainet.control.config import ControlConfig
+from viz.samples import record
+
+
+@pytest.fixture
+def said(monkeypatch, tmp_path, capsys):
+    """What is said of so many episodes that end alike."""
+
+    def run(trials, **ends):
+        records = [record(trial=trial, **ends) for trial in range(trials)]
+        monkeypatch.setattr(
+            "sainet.control.trials.run_trials", lambda *args, **settings: records
+        )
+        Control(
+            config=ControlConfig(model="physics", trials=trials), out=tmp_path
+        ).run()
+        return capsys.readouterr().out
+
+    return run
+
+
+def test_it_says_what_there_is_to_say(said):
+    one = said(1, solved=False)
+    assert "0 of 1 easy goals solved (95 % interval 0% to 79%).\n" in one
+    assert "each drawn in" in one
+    seven = said(7)
+    assert "7 of 7 easy goals solved" in seven
+    assert "with a median of 3 pushes.\n" in seven
+    assert "the first 6 drawn in" in seven
+
+
+def test_the_command_of_the_page_can_be_typed():
+    odd = ControlConfig(model="runs/my net; ls", trials=3)
+    words = shlex.split(control._command(odd))
+    assert words[2:] == ["--model", "runs/my net; ls", "--trials", "3", "--animate"]
