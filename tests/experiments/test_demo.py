@@ -1,5 +1,6 @@
 """The demo from its first push to its report, which opens and plays in a browser."""
 
+import html
 import json
 import subprocess
 import sys
@@ -31,11 +32,13 @@ def demo(tmp_path_factory):
 
 @pytest.mark.slow
 def test_the_demo_compares_four_models_on_both_disks(demo):
-    _, result = demo
+    out, result = demo
     rows = {(row["model"], row["body"]) for row in result["rows"]}
     models = ("physics", "physics-calibrated", "in", "sain")
     assert rows == {(model, body) for model in models for body in (1, 2)}
     assert all(row["n"] == 6 for row in result["rows"])
+    told = "100 pushes for 2 iterations of the paper's 10,000"
+    assert told in html.unescape((out / "report.html").read_text())
 
 
 @pytest.mark.slow

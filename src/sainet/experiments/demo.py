@@ -26,14 +26,14 @@ from sainet.viz.report import REPORT, Report, write_report
 _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with assumed \
 masses, radii and friction predicts such contacts badly (Physics); a network alone \
 learns them from data (IN); SAIN takes the engine's prediction and learns what is \
-wrong about it. All pushes here are simulated, with noise; the networks saw {pushes} \
-pushes for {iterations} iterations, a thirtieth of the paper's training. Physics, \
-calibrated knows the true masses and radii, but not the friction.
+wrong about it. All pushes here are simulated, with noise; the networks saw {pushes:,} \
+pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, calibrated \
+knows the true masses and radii, but not the friction.
 
 The replay shows the test push on which the engine is wrong by the median amount. Then \
-the SAIN that ships with the package, trained thirty times as long, pushes disk 2 to \
-an easy and to a hard goal by the paper's search; that world is simulated as well, \
-with disks, friction and noise that the engine inside does not know."""
+the SAIN that ships with the package, trained for all {paper:,}, pushes disk 2 to an \
+easy and to a hard goal by the paper's search; that world is simulated as well, with \
+disks, friction and noise that the engine inside does not know."""
 GOALS: tuple[Goals, ...] = ("easy", "hard")
 
 
@@ -123,7 +123,11 @@ def _draw(
     return Report(
         title="Simulator-augmented interaction networks, in three minutes",
         subtitle="A robot pushes a disk that pushes another: engine, network, and both",
-        summary=_SUMMARY.format(pushes=config.pushes, iterations=config.iterations),
+        summary=_SUMMARY.format(
+            pushes=config.pushes,
+            iterations=config.iterations,
+            paper=FitConfig().iterations,
+        ),
         table=evaluation.to_dict(),
         figures=(
             (paths, "The push of the replay: predicted paths against the true one."),
