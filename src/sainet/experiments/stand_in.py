@@ -131,7 +131,9 @@ def _as_recorded(
         "pose_observed": observed,
         "rate_observed": np.zeros_like(observed),
     }
-    return known | {simulated_name(_ENGINE): simulate(_ENGINE, known, info)}
+    names = [f"simulated push {number}" for number in push]
+    motion = simulate(_ENGINE, known, info, names)
+    return known | {simulated_name(_ENGINE): motion}
 
 
 def _at_all_steps(
