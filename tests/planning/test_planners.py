@@ -135,6 +135,23 @@ def test_the_greedy_search_follows_the_heuristic():
     assert found.looked_at == 12
 
 
+def test_the_greedy_search_looks_three_pushes_ahead_near_the_goal():
+    planner = GreedyPlanner(actions=FEW, expansions=1 + 6 + 36)  # all there are
+    found = planner.search(PHYSICS, NEAR, SCENE, STATE)
+    assert len(found.actions) == 3
+    assert found.is_complete
+    ends = naive_ends(3)
+    assert found.cost == pytest.approx(float(NEAR.cost(ends[found.actions])), abs=1e-5)
+
+
+@pytest.mark.parametrize("most", [0, 1])
+def test_the_greedy_search_ends_with_the_best_so_far_after_so_many_expansions(most):
+    planner = GreedyPlanner(actions=FEW, expansions=most)
+    found = planner.search(PHYSICS, FAR, SCENE, STATE)
+    assert (found.looked_at, found.is_complete) == (6 + 6 * most, False)
+    assert found.cost <= min(float(FAR.cost(e)) for e in naive_ends(1).values()) + 1e-6
+
+
 def test_a_queue_that_gives_nothing_ends_with_the_best_so_far():
     planner = GreedyPlanner(actions=FEW, same=10.0)  # every state is the first one
     found = planner.search(PHYSICS, FAR, SCENE, STATE)

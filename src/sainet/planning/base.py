@@ -26,7 +26,7 @@ class Plan:
     cost: float  # at the end
     distance: float  # at the end, m
     looked_at: int  # pushes that were predicted to choose these
-    is_complete: bool = True  # False: a deadline came first
+    is_complete: bool = True  # False: a deadline or a search's own limit came first
     warnings: tuple[str, ...] = ()  # why the prediction may be worth less
 
 

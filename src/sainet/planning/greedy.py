@@ -24,14 +24,15 @@ class GreedyPlanner(AbstractPlanner):
     The sequence of least heuristic is taken out, its 72 continuations are predicted and
     go into the queue, but for those that end where the queue has been already. The
     first sequence of the whole horizon that comes out is the plan; so is the nearest to
-    the goal of those that solve the task.
+    the goal of those that solve the task. Where the queue runs empty, or after so many
+    expansions, the sequence of least heuristic is, and the search is not complete.
     """
 
     actions: PushGrid = PushGrid()
     horizon: int = eqx.field(static=True, default=2)
     near_horizon: int = eqx.field(static=True, default=3)  # within 10 mm of the goal
     same: float = eqx.field(static=True, default=1e-3)  # m, between equal states
-    expansions: int = eqx.field(static=True, default=12)  # at most
+    expansions: int = eqx.field(static=True, default=12)  # after the first, at most
 
     def search(
         self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
