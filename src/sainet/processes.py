@@ -35,7 +35,7 @@ def worker_pool(workers: int | None) -> Iterator[Executor]:
         raise BadInput(f"--workers is {workers}; it must be at least 1.")
     pool = spawned_pool(workers or core_count())
     try:
-        yield _InterruptibleExecutor(pool)
+        yield pool
     except KeyboardInterrupt:
         # A terminal tells every process; whoever signals this one alone does not.
         for process in multiprocessing.active_children():
@@ -46,18 +46,20 @@ def worker_pool(workers: int | None) -> Iterator[Executor]:
         pool.shutdown(cancel_futures=True)
 
 
-def spawned_pool(workers: int) -> ProcessPoolExecutor:
-    """Return a pool of processes that end with this one.
+def spawned_pool(workers: int) -> Executor:
+    """Return a pool of processes that end with this one, quietly at Ctrl-C.
 
     Spawned, not forked: a process that is forked after JAX has started hangs.
     """
     context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+    return _InterruptibleExecutor(
+        ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+    )
 
 
 @final
 class _InterruptibleExecutor(Executor):
-    """Does jobs in a pool of processes that an interruption ends."""
+    """Does jobs in a pool of processes; none begins in an interrupted one."""
 
     def __init__(self, pool: ProcessPoolExecutor) -> None:
         self._pool = pool
@@ -71,6 +73,10 @@ class _InterruptibleExecutor(Executor):
     ) -> Future[Any]:
         """Have a job done."""
         return self._pool.submit(_do, work, *arguments, **named)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """End the processes."""
+        self._pool.shutdown(wait, cancel_futures=cancel_futures)
 
 
 @dataclass

@@ -1,6 +1,8 @@
 """What is Bullet's own: its bits, its processes, its friction, and life without it."""
 
+import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 from concurrent.futures import wait
@@ -59,6 +61,16 @@ def test_a_process_that_was_ended_is_told_of_and_replaced():
     before = roll_out(make_engine("bullet"), *many).states
     wait([pool._pool().submit(os._exit, 1)])
     with pytest.raises(SainetError, match="a worker process was ended"):
+        roll_out(make_engine("bullet"), *many)
+    assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
+
+
+def test_processes_that_were_interrupted_are_replaced():
+    many = pushed(GenerateConfig(disks=1, pushes=9), 3, 2)
+    before = roll_out(make_engine("bullet"), *many).states
+    for process in multiprocessing.active_children():
+        os.kill(process.pid, signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
         roll_out(make_engine("bullet"), *many)
     assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
 

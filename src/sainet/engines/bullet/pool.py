@@ -1,7 +1,7 @@
 """Pushes spread over processes, one PyBullet world in each."""
 
 import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from functools import lru_cache
 
@@ -28,6 +28,9 @@ def roll_everywhere(jobs: list[Job]) -> Moved:
     shares = [jobs[start : start + size] for start in range(0, len(jobs), size)]
     try:
         done = list(_pool().map(roll_jobs, shares))
+    except KeyboardInterrupt:
+        _pool.cache_clear()  # an interrupted process takes no more jobs
+        raise
     except BrokenProcessPool:
         _pool.cache_clear()
         raise worker_lost() from None
@@ -35,5 +38,5 @@ def roll_everywhere(jobs: list[Job]) -> Moved:
 
 
 @lru_cache
-def _pool() -> ProcessPoolExecutor:
+def _pool() -> Executor:
     return spawned_pool(core_count())
