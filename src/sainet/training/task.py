@@ -131,9 +131,8 @@ class Task:
         batch = inner.as_seen(batch) if inner and not inner.is_stored else batch
         if self.config.recurrent:
             return batch
-        # IN has statistics of an engine's path too, but no use for what it says of
-        # single steps.
-        return to_single_steps(batch, inner.make() if self.inner else None)
+        # IN's statistics are of an engine's path too, but not of its single steps.
+        return to_single_steps(batch, self.inner.make() if self.inner else None)
 
 
 def check_data(task: Task) -> None:
