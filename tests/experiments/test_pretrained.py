@@ -21,7 +21,7 @@ from sainet.training.config import FitConfig
 from support import REPOSITORY, require
 
 SAME = ("model", "kind", "time_step", "inner_engine", "truth_engine", "assumed")
-SAME += ("data_seed", "features", "recurrent", "format_version")
+SAME += ("data_seed", "earlier_seeds", "features", "recurrent", "format_version")
 SMALLER = ("iterations", "batch_size")
 
 
