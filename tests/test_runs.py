@@ -4,6 +4,8 @@ import errno
 import json
 import os
 import re
+import subprocess
+import sys
 
 import pytest
 
@@ -157,6 +159,35 @@ def test_the_folder_of_an_import_into_this_one_stays(tmp_path):
     open_here(tmp_path)
     open_here(tmp_path)
     assert (tmp_path / ".mit.0.partial").is_dir()
+
+
+AT_WORK = """
+import sys, time
+from pathlib import Path
+from sainet.runs import open_run
+run = open_run(Path(sys.argv[1]), {"seed": 0}, finished_by="done")
+print("at work", flush=True)
+time.sleep(60)
+"""
+
+
+def test_one_process_at_a_time_works_in_a_folder(tmp_path):
+    folder = tmp_path / "run"
+    command = [sys.executable, "-c", AT_WORK, str(folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"at work\n"
+        (folder / ".weights.0.partial").write_text("half")  # is being written
+        before = files(tmp_path)
+        with pytest.raises(RunConflict, match="another sainet is at work there"):
+            open_here(folder)
+        assert files(tmp_path) == before
+        (folder / "done").write_text("")
+        assert open_here(folder).is_finished  # whoever only reads may
+        (folder / "done").unlink()
+        other.kill()
+    # What this process has, it may have again: a traceback may keep the first.
+    first, second = open_here(folder), open_here(folder)
+    assert first.lock is second.lock is not None
 
 
 def test_a_name_that_no_folder_can_have_is_one_line(tmp_path):

@@ -10,12 +10,13 @@ import subprocess
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from sainet.errors import BadInput, RunConflict
+from sainet.locks import FolderLock, lock_folder
 
 FORMAT_VERSION = 1
 CONFIG = "config.json"
@@ -122,6 +123,8 @@ class RunFolder:
 
     path: Path
     finished_by: str
+    # Held as long as whoever works there keeps this.
+    lock: FolderLock | None = field(default=None, compare=False, repr=False)
 
     @property
     def is_finished(self) -> bool:
@@ -141,20 +144,41 @@ def open_run(
         devices: of JAX, when the result depends on their number.
 
     Raises:
-        RunConflict: the folder holds something else; nothing was touched.
+        RunConflict: the folder holds something else, or another process works there;
+            nothing was touched.
     """
     wanted = json.loads(to_json(dict(config)))
     folder = RunFolder(path, finished_by)
     with readable(path, RunConflict):
         _check_free(path, wanted)
-        for leftover in path.glob(".*.partial"):
-            if not leftover.is_dir():  # of an import into this folder, maybe alive
-                leftover.unlink(missing_ok=True)
+    try:
+        folder = replace(folder, lock=_lock(path))
+    except RunConflict:
+        if folder.is_finished:  # there is nothing to write any more
+            return folder
+        raise
+    for leftover in path.glob(".*.partial"):
+        if not leftover.is_dir():  # of an import into this folder, maybe alive
+            leftover.unlink(missing_ok=True)
     if not (path / MANIFEST).exists():
         write_json(path / MANIFEST, manifest(devices))
     if not (path / CONFIG).exists():
         write_json(path / CONFIG, wanted)
     return folder
+
+
+def _lock(path: Path) -> FolderLock | None:
+    """Make the folder, if need be, and keep other processes from working there."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        return lock_folder(path)
+    except BlockingIOError:
+        raise RunConflict(
+            f"{path}: another sainet is at work there; wait until it has ended, or "
+            "choose another --out."
+        ) from None
+    except OSError as error:
+        raise write_error(path, error) from error
 
 
 def remake(path: Path) -> str:

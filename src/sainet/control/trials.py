@@ -55,7 +55,7 @@ def run_trials(
     for name, before in _LATER.items():
         if settings[name] == before:
             del settings[name]
-    open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
+    folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     files = [episode_file(out, trial) for trial in range(config.trials)]
     known = {index for index, path in enumerate(files) if path.is_file()}
     for index in sorted(known):
@@ -64,7 +64,8 @@ def run_trials(
     for index in each_done(executor, run_trial, missing):
         on_episode(read_record(files[index]))
     records = [read_record(path) for path in files]
-    write_json(out / SUMMARY, {"episodes": [str(p.relative_to(out)) for p in files]})
+    told = {"episodes": [str(path.relative_to(out)) for path in files]}
+    write_json(folder.path / SUMMARY, told)
     return records
 
 

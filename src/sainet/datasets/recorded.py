@@ -1,13 +1,12 @@
 """What importers of recorded pushes share: frictions, s-bar, a folder made whole."""
 
-import fcntl
 import glob
 import logging
 import os
 import shutil
 import uuid
 from collections.abc import Callable, Hashable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +26,7 @@ from sainet.datasets.writer import HASHES
 from sainet.engines import make_assumed_engine
 from sainet.engines.base import roll_out
 from sainet.errors import BadInput
+from sainet.locks import lock_folder
 from sainet.runs import CONFIG, open_run, readable, write_error
 
 _log = logging.getLogger(__name__)
@@ -64,8 +64,8 @@ def make_once(
     """
     if not _is_finished(out, config):
         with _whole_or_nothing(out) as folder:
-            open_run(folder, config, finished_by=HASHES)
-            write(folder)
+            run = open_run(folder, config, finished_by=HASHES)
+            write(run.path)
     return open_store(out)
 
 
@@ -115,28 +115,10 @@ def partial_folders(out: Path) -> list[Path]:
     return [path for path in place.parent.glob(named) if path.is_dir()]
 
 
-@contextmanager
-def _held(folder: Path) -> Iterator[bool]:
-    """Hold a folder's lock, which the system lets go of even after `kill -9`.
-
-    Gives whether it is held: another import may have it, or the disk knows no locks.
-    """
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        is_held = True
-    except OSError:
-        is_held = False
-    try:
-        yield is_held
-    finally:
-        os.close(descriptor)
-
-
 def _remove_abandoned(out: Path) -> None:
     for folder in partial_folders(out):
-        with _held(folder) as is_held:
-            if is_held:
+        with suppress(BlockingIOError):  # another import is alive
+            if lock_folder(folder) is not None:
                 shutil.rmtree(folder)
 
 
@@ -147,9 +129,7 @@ def _whole_or_nothing(out: Path) -> Iterator[Path]:
     folder = place.with_name(f".{place.name}.{uuid.uuid4().hex}.partial")
     try:
         _remove_abandoned(out)
-        folder.mkdir(parents=True)
-        with _held(folder):
-            yield folder
+        yield folder
         # Only of a damaged store of the same settings: all of it was made again.
         if (place / CONFIG).is_file():
             shutil.rmtree(place)

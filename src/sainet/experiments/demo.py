@@ -54,7 +54,7 @@ def run_demo(config: DemoConfig, chain: Chain) -> DemoResult:
     """
     out = chain.out
     settings = {"command": "demo", **asdict(config)}
-    open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
+    folder = open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
     test = _simulate_and_train(chain, config)
     models = chain.models()
     chain.say("[bold]3[/] Comparing physics, IN and SAIN on pushes that none has seen.")
@@ -65,7 +65,7 @@ def run_demo(config: DemoConfig, chain: Chain) -> DemoResult:
     episodes = [push_to_goal(chain, goals, config) for goals in GOALS]
     chain.say("[bold]5[/] Drawing the figures and the report.")
     report = replace(_draw(models, test, evaluation, config, out), episodes=episodes)
-    return DemoResult(write_report(report, out / REPORT), table)
+    return DemoResult(write_report(report, folder.path / REPORT), table)
 
 
 def push_to_goal(chain: Chain, goals: Goals, config: DemoConfig) -> dict[str, Any]:
