@@ -175,6 +175,7 @@ def test_one_process_at_a_time_works_in_a_folder(tmp_path):
     folder = tmp_path / "run"
     command = [sys.executable, "-c", AT_WORK, str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
         assert other.stdout.readline() == b"at work\n"
         (folder / ".weights.0.partial").write_text("half")  # is being written
         before = files(tmp_path)
