@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import Affine2D, ScaledTranslation
 
 from sainet.runs import atomic_path
 from sainet.viz.palette import INK, PAPER, ModelStyle
@@ -46,6 +47,8 @@ _METADATA = {
     ".png": {"Software": None},
 }
 DOTS_PER_INCH = 200
+_LABEL_HEIGHT = 12.5  # points
+_PIECE = (7, 27)  # points right of the axes: of the line, before its label
 
 
 def house_look() -> AbstractContextManager[None]:
@@ -87,6 +90,8 @@ def label_ends(
 ) -> None:
     """Write each model's label beside the end of its line, none over another.
 
+    A piece of the line stands before it: lines may end at one place.
+
     Args:
         axes: with its limits and scales as they will be drawn.
         styles: of the lines.
@@ -99,16 +104,20 @@ def label_ends(
     styles, ends = zip(*known, strict=True)
     pixels = axes.transData.transform(np.asarray(ends, float))
     box = axes.get_window_extent()
-    # Text is about 11 points high; the figure's own dots are 1/72 of an inch here.
-    gap = 12.5 * axes.figure.dpi / 72  # type: ignore[union-attr]
+    in_points = Affine2D().scale(1 / 72) + axes.figure.dpi_scale_trans  # type: ignore[union-attr]
+    gap = _LABEL_HEIGHT * axes.figure.dpi / 72  # type: ignore[union-attr]
     heights = spread(pixels[:, 1], gap)
     for style, end, height in zip(styles, ends, heights, strict=True):
         axes.plot(*end, "o", color=style.color, markersize=4, clip_on=False)
+        up = (height - box.y0) / box.height
+        beside = in_points + ScaledTranslation(1, up, axes.transAxes)
+        look = line_look(style, 1.4)
+        axes.plot(_PIECE, (0, 0), transform=beside, clip_on=False, **look)
         axes.annotate(
             style.label,
-            xy=(1, (height - box.y0) / box.height),
+            xy=(1, up),
             xycoords="axes fraction",
-            xytext=(8, 0),
+            xytext=(_PIECE[1] + 5, 0),
             textcoords="offset points",
             va="center",
         )
