@@ -110,9 +110,9 @@ def label_ends(
     for style, end, height in zip(styles, ends, heights, strict=True):
         axes.plot(*end, "o", color=style.color, markersize=4, clip_on=False)
         up = (height - box.y0) / box.height
-        beside = in_points + ScaledTranslation(1, up, axes.transAxes)
+        to_end = ScaledTranslation(1, up, axes.transAxes)  # type: ignore[arg-type]
         look = line_look(style, 1.4)
-        axes.plot(_PIECE, (0, 0), transform=beside, clip_on=False, **look)
+        axes.plot(_PIECE, (0, 0), transform=in_points + to_end, clip_on=False, **look)
         axes.annotate(
             style.label,
             xy=(1, up),
