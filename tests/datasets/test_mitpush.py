@@ -12,8 +12,8 @@ import pytest
 from scipy.io import savemat
 
 from sainet.datasets.batch import to_batch
-from sainet.datasets.mitpush import import_endpoints
-from sainet.datasets.mitpush_mat import FIELDS
+from sainet.datasets.recorded.mitpush.endpoint_mat import FIELDS
+from sainet.datasets.recorded.mitpush.endpoints import import_endpoints
 from sainet.datasets.store import Store, open_store
 from sainet.errors import BadInput, BadStore, BadTable, RunConflict
 

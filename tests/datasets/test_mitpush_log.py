@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sainet.datasets.mitpush_csv import NUMBERS
-from sainet.datasets.mitpush_log import EndpointLog, read_log
-from sainet.datasets.mitpush_mat import FIELDS
+from sainet.datasets.recorded.mitpush.endpoint_csv import NUMBERS
+from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog, read_log
+from sainet.datasets.recorded.mitpush.endpoint_mat import FIELDS
 from sainet.errors import BadTable
 
 ROW = {

@@ -24,9 +24,9 @@ from datasets.raw_pushes import (
     with_traps,
 )
 from datasets.stores import assert_same_files, contents
-from sainet.datasets import archive, recorded_arrays
 from sainet.datasets.batch import to_batch
-from sainet.datasets.mitpush_raw import import_mitpush
+from sainet.datasets.recorded import arrays, files
+from sainet.datasets.recorded.mitpush.raw import import_mitpush
 from sainet.errors import BadInput, BadTable, MissingExtra, RunConflict
 
 WITHIN = 0.0017 + np.arange(1, 239) / 240  # s: steps that were recorded
@@ -127,7 +127,7 @@ def test_chunks_do_not_change_what_is_stored(
     files = {name(rep=i): to_json(recording(0.1 + 0.1 * i)) for i in range(3)}
     path = pack(tmp_path / "a.zip", files)
     whole = import_mitpush(path, tmp_path / "whole").read(slice(None))
-    monkeypatch.setattr(recorded_arrays, "_CHUNK_SIZE", 2)
+    monkeypatch.setattr(arrays, "_CHUNK_SIZE", 2)
     store = import_mitpush(path, tmp_path / "parts")
     assert store.info.chunk_size == 2
     parts = store.read(slice(None))
@@ -312,7 +312,7 @@ def test_hostile_archives_give_one_line_and_leave_nothing(tmp_path: Path, case: 
 
 def test_all_files_together_have_a_cap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = pack(tmp_path / "a.zip", {name(rep=i): to_json(recording()) for i in (1, 2)})
-    monkeypatch.setattr(archive, "LARGEST_SUM", int(1.5 * len(to_json(recording()))))
+    monkeypatch.setattr(files, "LARGEST_SUM", int(1.5 * len(to_json(recording()))))
     with pytest.raises(BadTable, match="_rep=0002.json' is too large"):
         import_mitpush(path, tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sainet.datasets.recorded_push import SMOOTHING, Unusable, resample
-from sainet.datasets.tracks import Track, without_symmetry_jumps
+from sainet.datasets.recorded.push import SMOOTHING, Unusable, resample
+from sainet.datasets.recorded.tracks import Track, without_symmetry_jumps
 
 
 def clock(duration: float = 1.0, start: float = 0.0) -> np.ndarray:

@@ -21,7 +21,7 @@ from datasets.own_pushes import (
 )
 from datasets.stores import assert_same_files, contents
 from sainet.datasets.batch import to_batch
-from sainet.datasets.table import import_table
+from sainet.datasets.recorded.table.importer import import_table
 from sainet.errors import BadInput, BadTable, MissingExtra, RunConflict
 from support import require
 

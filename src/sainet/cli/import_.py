@@ -47,7 +47,7 @@ class Import:
     def _import(self) -> "Store":
         friction = self.contact_friction
         if self.format == "table":
-            from sainet.datasets.table import import_table
+            from sainet.datasets.recorded.table.importer import import_table
 
             if self.properties is None:
                 raise BadInput("--properties is missing; give a TOML file of bodies.")
@@ -58,9 +58,9 @@ class Import:
             raise BadInput("--properties is for the format table; leave it out.")
         given = {} if friction is None else {"contact_friction": friction}
         if self.format == "mitpush":
-            from sainet.datasets.mitpush_raw import import_mitpush
+            from sainet.datasets.recorded.mitpush.raw import import_mitpush
 
             return import_mitpush(self.path, self.out, **given)
-        from sainet.datasets.mitpush import import_endpoints
+        from sainet.datasets.recorded.mitpush.endpoints import import_endpoints
 
         return import_endpoints(self.path, self.out, **given)

@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.mitpush_csv import PLAN, Row, read_csv
-from sainet.datasets.mitpush_mat import read_mat
+from sainet.datasets.recorded.files import read_bytes
+from sainet.datasets.recorded.mitpush.disk import SPEED_RANGE
+from sainet.datasets.recorded.mitpush.endpoint_csv import PLAN, Row, read_csv
+from sainet.datasets.recorded.mitpush.endpoint_mat import read_mat
 from sainet.errors import BadTable
 from sainet.runs import readable
 
@@ -16,7 +18,6 @@ ORIGIN = (
     "the pushes are not shipped; they come from the public repository "
     "robinzhoucmu/Pushing, folder mcube_data_proc/motion_model_eval_logs"
 )
-SPEED_RANGE = (1.0, 1000.0)  # mm/s: 12,000 to 12 steps of a push
 _FAR = 5.0  # m: beyond the reach of the robot's arm
 _MANY_TURNS = 20.0  # rad: an angle of one push is within a turn or two
 
@@ -79,20 +80,6 @@ def read_log(path: Path, data: bytes | None = None) -> EndpointLog:
         raise BadTable(f"{file}: has no rows; fetch the file again.")
     _check_rows(file, places, rows)
     return _to_log(file, places, rows, model)
-
-
-def read_bytes(path: Path) -> bytes:
-    """Return what a file holds.
-
-    Raises:
-        BadTable: it cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise BadTable(
-            f"{path}: cannot be read ({error.strerror}); check path and permissions."
-        ) from None
 
 
 def _to_log(path: Path, places: list[str], rows: list[Row], model: str) -> EndpointLog:

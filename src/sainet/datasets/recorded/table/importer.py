@@ -7,17 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from sainet.datasets.body_properties import BodyProperties, read_properties
-from sainet.datasets.recorded import make_once
-from sainet.datasets.recorded_arrays import (
+from sainet.datasets.recorded.arrays import (
     STORED_ENGINES,
     SceneProperties,
     write_pushes,
 )
+from sainet.datasets.recorded.folder import make_once
+from sainet.datasets.recorded.table.body_properties import (
+    BodyProperties,
+    read_properties,
+)
+from sainet.datasets.recorded.table.file import read_rows, read_table_bytes
+from sainet.datasets.recorded.table.pushes import to_pushes
+from sainet.datasets.recorded.table.rows import TableRows
 from sainet.datasets.store import Store
-from sainet.datasets.table_file import read_rows, read_table_bytes
-from sainet.datasets.table_pushes import to_pushes
-from sainet.datasets.table_rows import TableRows
 from sainet.errors import BadTable
 from sainet.runs import content_hash
 

@@ -1,51 +1,22 @@
-"""What importers of recorded pushes share: frictions, s-bar, a folder made whole."""
+"""A folder of recorded pushes: there when it is whole, and not before."""
 
 import glob
 import logging
 import os
 import shutil
 import uuid
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from jaxtyping import Float, Int
-
-from sainet.datasets.batch import (
-    check_finite,
-    from_trajectory,
-    to_controls,
-    to_initial,
-    to_scene,
-)
-from sainet.datasets.schema import StoreInfo
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import HASHES
-from sainet.engines import make_assumed_engine
-from sainet.engines.base import roll_out
 from sainet.errors import BadInput
 from sainet.locks import lock_folder
 from sainet.runs import CONFIG, open_run, readable, write_error
 
 _log = logging.getLogger(__name__)
-
-CONTACT_FRICTION = 0.25
-TABLE_FRICTION = 0.15  # the paper's; a quasi-static path hardly depends on it
-
-
-def check_frictions(contact_friction: float, table_friction: float) -> None:
-    """Check what the user says of friction.
-
-    Raises:
-        BadInput: one is negative or no number.
-    """
-    # No command has an option for the second: whoever calls from Python set it.
-    options = {"--contact-friction": contact_friction, "table_friction": table_friction}
-    for name, value in options.items():
-        if not 0 <= value < float("inf"):
-            raise BadInput(f"{name} is {value}; it must be zero or positive.")
 
 
 def make_once(
@@ -67,34 +38,6 @@ def make_once(
             run = open_run(folder, config, finished_by=HASHES)
             write(run.path)
     return open_store(out)
-
-
-def simulate(
-    name: str, arrays: dict[str, np.ndarray], info: StoreInfo, pushes: Sequence[str]
-) -> Float[np.ndarray, "push time body 6"]:
-    """Return s-bar: what an engine predicts with the properties that it assumes.
-
-    Args:
-        name: of the assumed engine.
-        arrays: scenes, starts and controls of some pushes, by variable name.
-        info: of their store.
-        pushes: what their file calls each of them.
-
-    Raises:
-        Diverged: the engine left the numbers.
-    """
-    scene, initial = to_scene(arrays, info), to_initial(arrays)
-    engine = make_assumed_engine(name)
-    trajectory = roll_out(engine, scene, initial, to_controls(arrays, info))
-    motion, _ = from_trajectory(trajectory)
-    check_finite(name, motion, pushes)
-    return motion
-
-
-def numbered(plans: Sequence[Hashable]) -> Int[np.ndarray, " push"]:
-    """Return a number for each push: equal plans share it, the first one's is 0."""
-    known = {plan: number for number, plan in enumerate(dict.fromkeys(plans))}
-    return np.array([known[plan] for plan in plans], np.int32)
 
 
 def _is_finished(out: Path, config: dict[str, Any]) -> bool:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.recorded_push import RecordedPush, Unusable, resample
-from sainet.datasets.tracks import (
+from sainet.datasets.recorded.push import RecordedPush, Unusable, resample
+from sainet.datasets.recorded.tracks import (
     ALLOWED_MOVE,
     ALLOWED_TURN,
     Track,

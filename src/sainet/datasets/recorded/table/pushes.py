@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.datasets.body_properties import BodyProperties
-from sainet.datasets.recorded_push import (
+from sainet.datasets.recorded.push import (
     LONGEST,
     RecordedPush,
     Unusable,
     resample,
 )
-from sainet.datasets.table_rows import GROUP, NUMBERS, TableRows
-from sainet.datasets.tracks import (
+from sainet.datasets.recorded.table.body_properties import BodyProperties
+from sainet.datasets.recorded.table.rows import GROUP, NUMBERS, TableRows
+from sainet.datasets.recorded.tracks import (
     ALLOWED_MOVE,
     ALLOWED_TURN,
     Track,

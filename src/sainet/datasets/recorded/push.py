@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sainet.datasets.tracks import Track
+from sainet.datasets.recorded.tracks import Track
 from sainet.scene import TIME_STEP
 
 LONGEST = 60.0  # s

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sainet.datasets.table_rows import (
+from sainet.datasets.recorded.table.rows import (
     GROUP,
     MOST_ROWS,
     NUMBERS,

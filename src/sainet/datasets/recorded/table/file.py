@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from sainet.datasets.mitpush_log import read_bytes
-from sainet.datasets.table_csv import read_csv
-from sainet.datasets.table_rows import TableRows
+from sainet.datasets.recorded.files import read_bytes
+from sainet.datasets.recorded.table.csv_rows import read_csv
+from sainet.datasets.recorded.table.rows import TableRows
 from sainet.errors import BadTable
 from sainet.runs import readable
 
@@ -24,7 +24,7 @@ def read_rows(path: Path, data: bytes | None = None) -> TableRows:
     """
     data = read_table_bytes(path) if data is None else data
     if path.suffix.lower() == ".parquet":
-        from sainet.datasets.table_parquet import read_parquet
+        from sainet.datasets.recorded.table.parquet_rows import read_parquet
 
         rows = read_parquet(path, data)
     else:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sainet.datasets.mitpush_csv import Row
+from sainet.datasets.recorded.mitpush.endpoint_csv import Row
 from sainet.errors import BadTable
 
 # Each field of a record, and the columns of the table that say the same.

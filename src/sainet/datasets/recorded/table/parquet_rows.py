@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sainet.datasets.table_rows import (
+from sainet.datasets.recorded.table.rows import (
     GROUP,
     MOST_ROWS,
     NUMBERS,

@@ -1,14 +1,15 @@
 """Recorded pushes as the arrays of a store, chunk by chunk, with s-bar beside them."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Int
 
-from sainet.datasets.recorded import numbered, simulate
-from sainet.datasets.recorded_push import RecordedPush
+from sainet.datasets.recorded.assumed import simulate
+from sainet.datasets.recorded.push import RecordedPush
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk
 from sainet.scene import TIME_STEP
@@ -143,3 +144,9 @@ def _path(pushes: Sequence[RecordedPush], info: StoreInfo) -> Arrays:
         "command_position": position,
         "command_velocity": velocity,
     }
+
+
+def numbered(plans: Sequence[Hashable]) -> Int[np.ndarray, " push"]:
+    """Return a number for each push: equal plans share it, the first one's is 0."""
+    known = {plan: number for number, plan in enumerate(dict.fromkeys(plans))}
+    return np.array([known[plan] for plan in plans], np.int32)

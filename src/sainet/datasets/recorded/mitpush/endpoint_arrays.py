@@ -3,14 +3,13 @@
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.mitpush_log import EndpointLog
-from sainet.datasets.recorded import numbered, simulate
+from sainet.datasets.recorded.arrays import numbered
+from sainet.datasets.recorded.assumed import simulate
+from sainet.datasets.recorded.mitpush.disk import MASS, PUSHER_RADIUS, RADIUS
+from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog
 from sainet.datasets.schema import StoreInfo, published_name, simulated_name
 from sainet.scene import TIME_STEP
 
-MASS = 0.8937  # kg
-RADIUS = 0.0525  # m
-PUSHER_RADIUS = 0.00475  # m
 STROKE = 0.050  # m: recorded ones are within 0.7 mm of it
 ASSUMED_ENGINE = "planar"
 _CHUNK_SIZE = 250  # pushes

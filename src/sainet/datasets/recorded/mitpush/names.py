@@ -5,14 +5,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sainet.datasets.archive import ArchivedFile
-from sainet.datasets.mitpush_log import SPEED_RANGE
+from sainet.datasets.recorded.files import ArchivedFile
+from sainet.datasets.recorded.mitpush.disk import DISK, NO_DISKS, SPEED_RANGE
 
-DISK = "ellip1"
-NO_DISKS = (
-    *("ellip2", "ellip3", "rect1", "rect2", "rect3", "tri1", "tri2", "tri3"),
-    *("hex", "butter"),
-)
 SMALLEST = 100  # bytes: files below are the remains of recordings that failed
 ENDINGS = (".json", ".h5")  # of the same push, the first is taken
 _NAME = re.compile(

@@ -1,4 +1,4 @@
-"""Files of a folder or of zips in it, read in memory under caps, never extracted."""
+"""Files that are read whole; those of zips under caps, in memory, never extracted."""
 
 import re
 import zipfile
@@ -35,6 +35,20 @@ class ArchivedFile:
     def __str__(self) -> str:
         """Name the file in a message of one line."""
         return str(self.path) + (f": {_shown(self.member)}" if self.member else "")
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return what a file holds.
+
+    Raises:
+        BadTable: it cannot be read.
+    """
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise BadTable(
+            f"{path}: cannot be read ({error.strerror}); check path and permissions."
+        ) from None
 
 
 def list_files(path: Path) -> list[ArchivedFile]:

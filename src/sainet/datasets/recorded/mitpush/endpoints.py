@@ -7,14 +7,23 @@ and after each push; in between nothing was observed, and the store says so.
 from pathlib import Path
 from typing import Any
 
-from sainet.datasets.mitpush_arrays import ASSUMED_ENGINE, store_info, to_arrays
-from sainet.datasets.mitpush_log import EndpointLog, find_log, read_bytes, read_log
-from sainet.datasets.mitpush_names import DISK, NO_DISKS
-from sainet.datasets.recorded import (
+from sainet.datasets.recorded.assumed import (
     CONTACT_FRICTION,
     TABLE_FRICTION,
     check_frictions,
-    make_once,
+)
+from sainet.datasets.recorded.files import read_bytes
+from sainet.datasets.recorded.folder import make_once
+from sainet.datasets.recorded.mitpush.disk import DISK, NO_DISKS
+from sainet.datasets.recorded.mitpush.endpoint_arrays import (
+    ASSUMED_ENGINE,
+    store_info,
+    to_arrays,
+)
+from sainet.datasets.recorded.mitpush.endpoint_log import (
+    EndpointLog,
+    find_log,
+    read_log,
 )
 from sainet.datasets.store import Store
 from sainet.datasets.writer import write_store

@@ -6,23 +6,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from sainet.datasets.archive import list_files, read_files
-from sainet.datasets.mitpush_arrays import MASS, PUSHER_RADIUS, RADIUS
-from sainet.datasets.mitpush_motion import read_motion
-from sainet.datasets.mitpush_names import DISK, MotionFile, choose
-from sainet.datasets.recorded import (
-    CONTACT_FRICTION,
-    TABLE_FRICTION,
-    check_frictions,
-    make_once,
-    partial_folders,
-)
-from sainet.datasets.recorded_arrays import (
+from sainet.datasets.recorded.arrays import (
     STORED_ENGINES,
     SceneProperties,
     write_pushes,
 )
-from sainet.datasets.recorded_push import RecordedPush, Unusable
+from sainet.datasets.recorded.assumed import (
+    CONTACT_FRICTION,
+    TABLE_FRICTION,
+    check_frictions,
+)
+from sainet.datasets.recorded.files import list_files, read_files
+from sainet.datasets.recorded.folder import make_once, partial_folders
+from sainet.datasets.recorded.mitpush.disk import DISK, MASS, PUSHER_RADIUS, RADIUS
+from sainet.datasets.recorded.mitpush.motion import read_motion
+from sainet.datasets.recorded.mitpush.names import MotionFile, choose
+from sainet.datasets.recorded.push import RecordedPush, Unusable
 from sainet.datasets.store import Store
 from sainet.errors import BadTable
 from sainet.runs import content_hash, to_json

@@ -1,0 +1,1 @@
+"""Recorded pushes of real robots, read into stores like any other."""

@@ -1,0 +1,1 @@
+"""The MIT Push dataset: pushes known at their ends, and raw recordings."""

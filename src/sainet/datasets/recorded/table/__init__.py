@@ -1,0 +1,1 @@
+"""Anybody's own pushes: a table from CSV or Parquet, checked row by row."""
