@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from headlines import main as write_headlines
 from readings import of_control, of_errors, of_groups
 from receipts import RECEIPTS, keep, restore
 
@@ -57,6 +58,7 @@ def main() -> None:
         ordered = [parts[title] for title, _ in SECTIONS.values() if title in parts]
         PAGE.write_text("\n".join([_head(), *ordered]), "utf-8")
         keep(ROOT / RUNS, RECEIPTS)
+    write_headlines()
 
 
 def _standing() -> dict[str, str]:
