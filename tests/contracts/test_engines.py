@@ -35,7 +35,7 @@ from sainet.engines.base import roll_out
 from sainet.pushes import Controls, ForceControls, PathControls
 from sainet.scene import GRAVITY, TIME_STEP, Scene, State, pair_gaps, pusher_gaps
 
-BATCH = 48  # scenes of each kind
+BATCH = 32  # scenes of each kind
 STEPS = 120
 CASES = [
     ("robot", 1),
