@@ -11,6 +11,7 @@ from tyro.conf import subcommand
 
 import sainet
 from sainet.cli.bench import Bench
+from sainet.cli.bystander import AddBystander
 from sainet.cli.control import Control
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
@@ -33,6 +34,7 @@ def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
         Annotated[Demo, subcommand("demo")]
         | Annotated[Generate, subcommand("generate")]
         | Annotated[Import, subcommand("import")]
+        | Annotated[AddBystander, subcommand("add-bystander")]
         | Annotated[Train, train]
         | Annotated[Evaluate, subcommand("evaluate")]
         | Annotated[Identify, subcommand("identify")]

@@ -24,7 +24,7 @@ def derive(
         out: the run folder.
         settings: what the function does, as JSON values: they and the content of the
             store decide whether a folder holds the same already.
-        change: returns the same arrays, changed or with fewer pushes.
+        change: returns the same arrays, changed, of fewer pushes or of more disks.
 
     Raises:
         RunConflict: the folder holds something else.
@@ -33,5 +33,6 @@ def derive(
     folder = open_run(out, told, finished_by=HASHES)
     if not folder.is_finished:
         arrays = change(store.read(slice(None)))
-        write_store(out, replace(store.info, pushes=len(arrays["mass"])), arrays)
+        pushes, bodies = arrays["mass"].shape
+        write_store(out, replace(store.info, pushes=pushes, bodies=bodies), arrays)
     return open_store(out)

@@ -81,18 +81,22 @@ class Chain:
         *,
         name: str | None = None,
         assumed_engine: str = "planar",
+        start_from: str | None = None,
     ) -> list[str]:
-        """Train a network from several seeds; returns the names of their folders."""
-        folders = [f"{name or model}-seed-{seed}" for seed in seeds]
-        for folder, seed in zip(folders, seeds, strict=True):
+        """Train a network from several seeds; returns the names of their folders.
+
+        With the name of another network, each goes on from the one of its own seed.
+        """
+        for seed in seeds:
             self.train(
                 model,
                 store,
                 replace(config, seed=seed),
-                name=folder,
+                name=of_seed(name or model, seed),
                 assumed_engine=assumed_engine,
+                start_from=start_from and str(self.out / of_seed(start_from, seed)),
             )
-        return folders
+        return [of_seed(name or model, seed) for seed in seeds]
 
     def compare_trainings(
         self,
@@ -156,3 +160,8 @@ class Chain:
         folders = [str(self.out / name) for name in networks]
         physics = [load_dynamics(name, engine=engine) for name in PHYSICS]
         return [*physics, *map(load_dynamics, folders)]
+
+
+def of_seed(name: str, seed: int) -> str:
+    """Return the name of a training's folder."""
+    return f"{name}-seed-{seed}"

@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig, Setup
 from sainet.datasets.store import Store
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
-from sainet.training.config import FitConfig
+from sainet.experiments.few_pushes import recipe
+from sainet.training.config import FitConfig, ModelKind
 
 AROUND = {
     "sain-bullet": "bullet",
@@ -20,6 +22,7 @@ AROUND = {
     "sain-calibrated": "planar-calibrated",
 }
 NETWORKS = ("in", *AROUND)
+BYSTANDER = "bystander"  # what networks are called that went on beside one
 _CHUNK = 250  # pushes
 _TEST_SEED, _VALIDATION_SEED = 1, 2
 
@@ -62,6 +65,10 @@ class PaperSetup:
         """Return pushes to choose settings by: neither trained nor tested on."""
         return self._simulate("validation", self.sizes.tests, seed=_VALIDATION_SEED)
 
+    def training_pushes_with_bystander(self) -> Store:
+        """Return the same pushes, beside each a disk that nothing touches."""
+        return add_bystander(self.training_pushes(), self.chain.out / "train-bystander")
+
     def train(
         self,
         name: str,
@@ -83,12 +90,30 @@ class PaperSetup:
         count = self.sizes.pushes if pushes is None else pushes
         usual = FitConfig(iterations=self.sizes.iterations, batch_size=min(100, count))
         return self.chain.train_several(
-            "in" if name == "in" else "sain",
+            _kind(name),
             self.training_pushes().first(count),
             replace(usual, **recipe),
             seeds,
             name="-".join(part for part in (name, form) if part),
             assumed_engine=AROUND.get(name, "planar"),
+        )
+
+    def train_beside_bystander(self, name: str, seeds: Sequence[int]) -> list[str]:
+        """Let trained ones of `NETWORKS` go on, beside a disk that nothing touches.
+
+        With the settings that hold for going on from any network, but for the steps,
+        which are those that the network was trained on.
+        """
+        store = self.training_pushes_with_bystander()
+        changes = {"steps": FitConfig.steps}
+        return self.chain.train_several(
+            _kind(name),
+            store,
+            recipe(name, self.scale, store.info.pushes, changes),
+            seeds,
+            name=f"{name}-{BYSTANDER}",
+            assumed_engine=AROUND.get(name, "planar"),
+            start_from=name,
         )
 
     def compare(
@@ -115,6 +140,10 @@ class PaperSetup:
             **changes,
         )
         return self.chain.simulate(name, config)
+
+
+def _kind(name: str) -> ModelKind:
+    return "in" if name == "in" else "sain"
 
 
 def paper_setup(setup: Setup, scale: Scale, chain: Chain) -> PaperSetup:

@@ -20,8 +20,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import j0
 
+from sainet.datasets.assumed import simulate
 from sainet.datasets.derive import derive
-from sainet.datasets.recorded.assumed import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
 from sainet.experiments.chain import Chain

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from sainet.datasets.recorded.assumed import simulate
+from sainet.datasets.assumed import simulate
 from sainet.datasets.recorded.push import RecordedPush
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk

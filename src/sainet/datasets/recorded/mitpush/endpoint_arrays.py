@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
+from sainet.datasets.assumed import simulate
 from sainet.datasets.recorded.arrays import numbered
-from sainet.datasets.recorded.assumed import simulate
 from sainet.datasets.recorded.mitpush.disk import MASS, PUSHER_RADIUS, RADIUS
 from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog
 from sainet.datasets.schema import StoreInfo, published_name, simulated_name

@@ -7,13 +7,13 @@ and after each push; in between nothing was observed, and the store says so.
 from pathlib import Path
 from typing import Any
 
-from sainet.datasets.recorded.assumed import (
+from sainet.datasets.recorded.files import read_bytes
+from sainet.datasets.recorded.folder import make_once
+from sainet.datasets.recorded.frictions import (
     CONTACT_FRICTION,
     TABLE_FRICTION,
     check_frictions,
 )
-from sainet.datasets.recorded.files import read_bytes
-from sainet.datasets.recorded.folder import make_once
 from sainet.datasets.recorded.mitpush.disk import DISK, NO_DISKS
 from sainet.datasets.recorded.mitpush.endpoint_arrays import (
     ASSUMED_ENGINE,

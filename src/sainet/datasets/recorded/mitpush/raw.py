@@ -11,13 +11,13 @@ from sainet.datasets.recorded.arrays import (
     SceneProperties,
     write_pushes,
 )
-from sainet.datasets.recorded.assumed import (
+from sainet.datasets.recorded.files import list_files, read_files
+from sainet.datasets.recorded.folder import make_once, partial_folders
+from sainet.datasets.recorded.frictions import (
     CONTACT_FRICTION,
     TABLE_FRICTION,
     check_frictions,
 )
-from sainet.datasets.recorded.files import list_files, read_files
-from sainet.datasets.recorded.folder import make_once, partial_folders
 from sainet.datasets.recorded.mitpush.disk import DISK, MASS, PUSHER_RADIUS, RADIUS
 from sainet.datasets.recorded.mitpush.motion import read_motion
 from sainet.datasets.recorded.mitpush.names import MotionFile, choose

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sainet.datasets.recorded.assumed import (
+from sainet.datasets.recorded.files import read_bytes
+from sainet.datasets.recorded.frictions import (
     CONTACT_FRICTION,
     TABLE_FRICTION,
     check_frictions,
 )
-from sainet.datasets.recorded.files import read_bytes
 from sainet.errors import BadTable
 
 EXAMPLE = "[bodies.NAME] with mass = 0.9 and radius = 0.05, and [pusher] radius = 0.005"
