@@ -7,6 +7,7 @@ from sainet.viz.control_table import CHANCE
 from sainet.viz.palette import styles_of
 
 _PHYSICS, _CALIBRATED, _ALONE = "physics", "physics-calibrated", "in"
+_BYSTANDER = "-bystander"
 _ERRORS = {"pos_mm": "pos", "rot_deg": "rot"}
 _PUBLISHED = ("physics", "in", "sain-bullet")  # the paper's rows, as we name them
 
@@ -60,9 +61,28 @@ def of_errors(table: Mapping[str, Any]) -> str:
         _beside_the_paper(table),
         f"Calibrate or learn? {verdicts[0]} {_worth(rows)}",
         verdicts[1],
+        *_beside_bystanders(table),
         _chance(comparisons),
     ]
     return "\n\n".join(parts)
+
+
+def _beside_bystanders(table: Mapping[str, Any]) -> list[str]:
+    """Say what going on beside a bystander gave, and cost where there is none."""
+    taught = [name for name in _models(table["rows"]) if name.endswith(_BYSTANDER)]
+    if not taught:
+        return []
+    said = []
+    for part, where in ((table, "here"), (table["as_trained"], "on two disks")):
+        verdicts = "; ".join(
+            f"{_label(name)} is "
+            + _verdict(part["comparisons"], name, name.removesuffix(_BYSTANDER))
+            for name in taught
+        )
+        said.append(f"Against the network that it goes on from, {where}: {verdicts}.")
+    lines = ["| On two disks, error over that of Physics | pos | rot |"]
+    lines += ["| :-- | --: | --: |", *_ratios(table["as_trained"]["rows"], "{}")]
+    return [*said, "\n".join(lines)]
 
 
 def of_groups(

@@ -447,7 +447,10 @@ SECTIONS = {
             "direct-force-three-disks",
             f"the networks of Table I, which have seen two disks alone; {_FIVE} "
             f"{_FORCE} Only pairs of disks within 20 mm act on each other in the "
-            "networks (`interaction.REACH`); the paper lets all act.",
+            "networks (`interaction.REACH`); the paper lets all act. Those of names "
+            "that end in *bystander* went on for 300 iterations on the same two-disk "
+            "pushes with a third disk beside each, which nothing touches (`sainet "
+            "add-bystander`; `docs/theory.md` says why).",
             reading=of_errors,
         ),
     ),

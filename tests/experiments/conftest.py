@@ -28,6 +28,7 @@ def tiny(monkeypatch):
     # The tables have every network; here one is enough, and compiles faster.
     for name in ("data_efficiency", "recurrent_or_not", "regularisation", "robustness"):
         places[f"{name}.NETWORKS"] = ("in",)
+    places["paper_tables.BESIDE"] = ("sain",)
     for name, value in places.items():
         monkeypatch.setattr(f"sainet.experiments.{name}", value)
 

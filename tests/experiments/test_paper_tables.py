@@ -7,7 +7,7 @@ import pytest
 
 from sainet.datasets.store import open_store
 from sainet.experiments.data_efficiency import IN_FULL
-from sainet.experiments.paper_setup import AROUND, NETWORKS
+from sainet.experiments.paper_setup import AROUND, BYSTANDER, NETWORKS
 from sainet.experiments.published import DIRECT_FORCE_THREE_DISKS, published_rows
 from sainet.experiments.regularisation import score
 from sainet.experiments.robustness import push_angles
@@ -36,11 +36,25 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
     made = cards(tmp_path)
     three = make("direct-force-three-disks")
     assert len(made) == len(NETWORKS)
-    assert cards(tmp_path) == made
-    for disks, table in ((2, two), (3, three)):
-        models, bodies = PHYSICS | set(NETWORKS), range(1, disks + 1)
+    after = cards(tmp_path)
+    assert {path: after[path] for path in made} == made
+    beside = {f"sain-{BYSTANDER}"}
+    added = {path.parent.name for path in after.keys() - made.keys()}
+    assert added == {f"{name}-seed-0" for name in beside}
+    for disks, table, more in (
+        (2, two, set()),
+        (3, three, beside),
+        (2, three["as_trained"], beside),
+    ):
+        models, bodies = PHYSICS | set(NETWORKS) | more, range(1, disks + 1)
         assert rows_of(table) == {(None, m, b) for m in models for b in bodies}
         assert all(row["n"] == 4 for row in table["rows"])
+    old, new = (
+        read_json(tmp_path / "direct-force-quick" / f"{name}-seed-0" / "card.json")
+        for name in ("sain", *beside)
+    )
+    assert new["started_from"] == old["weights"]
+    assert new["inner_engine"] == old["inner_engine"]
     assert three["published"] == published_rows(DIRECT_FORCE_THREE_DISKS)
     kept = read_json(tmp_path / "direct-force-three-disks" / "table.json")
     assert kept["rows"] == three["rows"]

@@ -73,6 +73,35 @@ def test_errors_stand_in_relation_to_physics_and_to_what_a_model_is_compared_wit
     assert "this table has 5" in told
 
 
+def test_what_a_bystander_taught_and_cost_is_told():
+    taught = "sain-bystander"
+
+    def table(sain: float, beside: float) -> dict:
+        return {
+            "rows": errors("physics", (2.0, 2.0), (1.0, 1.0))
+            + errors("sain", (sain, sain), (0.5, 0.5))
+            + errors(taught, (beside, beside), (0.5, 0.5)),
+            "comparisons": [],
+        }
+
+    better = pair("pos_mm", 2, (-0.6, -0.4), "sain", model=taught)
+    worse = pair("rot_deg", 1, (0.1, 0.2), "sain", model=taught)
+    told = READINGS["of_errors"](
+        table(1.0, 0.5)
+        | {
+            "published": errors("physics", (6.0, 6.0), (1.0, 1.0)),
+            "comparisons": [better],
+            "as_trained": table(0.2, 0.3) | {"comparisons": [worse]},
+        }
+    )
+    said = "Against the network that it goes on from"
+    assert f"{said}, here: {taught} is better in pos of disk 2." in told
+    assert f"{said}, on two disks: {taught} is worse in rot of disk 1." in told
+    first, after = told.split("| On two disks, error over that of Physics |")
+    assert f"| {taught} | 0.25 / 0.25 | 0.50 / 0.50 |" in first
+    assert f"| {taught} | 0.15 / 0.15 | 0.50 / 0.50 |" in after
+
+
 def test_groups_of_pushes_are_set_beside_each_other():
     def of_group(group: str, sain: float) -> list:
         rows = errors("physics", (2.0, 1.0), (1.0, 1.0)) + errors(

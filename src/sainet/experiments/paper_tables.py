@@ -22,6 +22,7 @@ from sainet.experiments.published import (
 )
 
 TRAINED_DISKS = 2
+BESIDE = NETWORKS  # what meets a bystander before it meets three disks
 SEEDS = {"quick": range(1), "paper": range(5)}  # trainings of each network
 
 
@@ -71,7 +72,7 @@ def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
     if table.disks > TRAINED_DISKS:
         trainings |= {
             f"{name}-{BYSTANDER}": setup.train_beside_bystander(name, SEEDS[scale])
-            for name in NETWORKS
+            for name in BESIDE
         }
     result = setup.compare(trainings, tests)
     if table.disks > TRAINED_DISKS:
