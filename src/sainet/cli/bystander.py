@@ -34,8 +34,11 @@ class AddBystander:
 
         require_option(self.seed >= 0, "seed", "at least 0", self.seed)
         store = open_store(self.data)
-        with progress_bar("Asking the assumed engines", None, self.output):
-            found = add_bystander(store, self.out, seed=self.seed)
+        total = store.info.pushes * len(store.info.assumed_engines)
+        with progress_bar("Predicting s-bar", total, self.output) as advance:
+            found = add_bystander(
+                store, self.out, seed=self.seed, on_pushes=lambda n: advance(n, "")
+            )
         info = found.info
         self.output.say(f"{info.pushes} pushes of {info.bodies} disks: {self.out}")
         return {"out": str(self.out), "pushes": info.pushes, "disks": info.bodies}

@@ -7,6 +7,7 @@ are known, and lies wherever those leave it alone, also right beside another dis
 the assumed engine has to be asked again: it may believe that the disks overlap.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -29,13 +30,20 @@ _NOWHERE_NEAR = 1.0  # m
 _STREAM = 0xB157A
 
 
-def add_bystander(store: Store, out: Path, *, seed: int = 0) -> Store:
+def add_bystander(
+    store: Store,
+    out: Path,
+    *,
+    seed: int = 0,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+) -> Store:
     """Write a dataset of the same pushes, each with a bystander, once.
 
     Args:
         store: read whole into memory.
         out: the run folder.
         seed: of the bystanders' masses, radii and places.
+        on_pushes: told how many pushes an assumed engine has just predicted.
 
     Raises:
         BadStore: the paths of its disks are not known all the way.
@@ -46,7 +54,7 @@ def add_bystander(store: Store, out: Path, *, seed: int = 0) -> Store:
 
     def change(arrays: Arrays) -> Arrays:
         _check_paths(store, arrays)
-        return with_bystander(arrays, store.info, rng)
+        return with_bystander(arrays, store.info, rng, on_pushes)
 
     return derive(store, out, {"bystander_seed": seed}, change)
 
@@ -66,7 +74,12 @@ def _lasts(arrays: Arrays) -> Bool[np.ndarray, "push time"]:
     return np.arange(arrays["truth"].shape[1]) < arrays["steps"][:, None]
 
 
-def with_bystander(arrays: Arrays, info: StoreInfo, rng: np.random.Generator) -> Arrays:
+def with_bystander(
+    arrays: Arrays,
+    info: StoreInfo,
+    rng: np.random.Generator,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+) -> Arrays:
     """Return every array of a store with one disk more in each push, the last one.
 
     Its mass and radius are drawn uniformly from the range that the store has. It is
@@ -93,7 +106,7 @@ def with_bystander(arrays: Arrays, info: StoreInfo, rng: np.random.Generator) ->
         found[name] = array
     wider = replace(info, pushes=pushes, bodies=info.bodies + 1)
     for engine in info.assumed_engines:
-        found[simulated_name(engine)] = _simulate(engine, found, wider)
+        found[simulated_name(engine)] = _simulate(engine, found, wider, on_pushes)
     return found
 
 
@@ -104,13 +117,16 @@ def _append(array: np.ndarray, values: np.ndarray | None, axis: int) -> np.ndarr
     return np.concatenate([array, one.astype(array.dtype)], axis=axis)
 
 
-def _simulate(engine: str, arrays: Arrays, info: StoreInfo) -> np.ndarray:
+def _simulate(
+    engine: str, arrays: Arrays, info: StoreInfo, on_pushes: Callable[[int], None]
+) -> np.ndarray:
     parts = []
     for index in range(info.chunks):
         rows = info.chunk_slice(index)
         names = [f"push {row} of the dataset" for row in range(rows.start, rows.stop)]
         chunk = {name: array[rows] for name, array in arrays.items()}
         parts.append(simulate(engine, chunk, info, names))
+        on_pushes(len(names))
     return np.concatenate(parts)
 
 

@@ -67,7 +67,12 @@ class PaperSetup:
 
     def training_pushes_with_bystander(self) -> Store:
         """Return the same pushes, beside each a disk that nothing touches."""
-        return add_bystander(self.training_pushes(), self.chain.out / "train-bystander")
+        store, name = self.training_pushes(), "train-bystander"
+        total = store.info.pushes * len(store.info.assumed_engines)
+        with self.chain.bar(f"Predicting s-bar of {name}", total) as advance:
+            return add_bystander(
+                store, self.chain.out / name, on_pushes=lambda n: advance(n, "")
+            )
 
     def train(
         self,
