@@ -14,7 +14,7 @@ class AddBystander:
     """Lay one disk more beside each push, untouched: it teaches what does not act.
 
     A network that goes on from there does better among more disks than it was trained
-    on: `sainet train sain --start-from sain --iterations 1000 --data OUT`.
+    on: `sainet train sain --start-from sain --data OUT --out DIR`.
     """
 
     data: Path

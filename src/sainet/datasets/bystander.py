@@ -21,7 +21,7 @@ from sainet.datasets.schema import Arrays, StoreInfo, simulated_name, variables
 from sainet.datasets.store import Store
 from sainet.errors import BadStore
 
-TOUCHING = 0.5  # share of the bystanders that begin in touch with another disk
+TOUCHING = 0.5  # share of the tries that are in touch with another disk
 FARTHEST = 0.02  # m, the widest gap to the disk beside which one lies
 _TOUCH = 1e-5  # m, a gap that no rounding makes an overlap
 _BESIDE_PUSHER = 5e-4  # m, by which the pushed disk is nearer to the pusher

@@ -81,7 +81,7 @@ class PaperSetup:
         *,
         form: str = "",
         pushes: int | None = None,
-        **recipe: Any,  # noqa: ANN401
+        **changes: Any,  # noqa: ANN401
     ) -> list[str]:
         """Train one of `NETWORKS`; returns the names of the trainings' folders.
 
@@ -90,14 +90,14 @@ class PaperSetup:
             seeds: a training for each.
             form: of the training, where it is not the usual one: goes into the names.
             pushes: how many of the training pushes to use; None is all.
-            recipe: settings of the training that are not the paper's.
+            changes: settings of the training that are not the paper's.
         """
         count = self.sizes.pushes if pushes is None else pushes
         usual = FitConfig(iterations=self.sizes.iterations, batch_size=min(100, count))
         return self.chain.train_several(
             _kind(name),
             self.training_pushes().first(count),
-            replace(usual, **recipe),
+            replace(usual, **changes),
             seeds,
             name="-".join(part for part in (name, form) if part),
             assumed_engine=AROUND.get(name, "planar"),

@@ -69,13 +69,12 @@ def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
     setup = paper_setup(table.setup, scale, chain)
     tests = setup.test_pushes(f"test-{table.disks}-disks", disks=table.disks)
     trainings = {name: setup.train(name, SEEDS[scale]) for name in NETWORKS}
-    if table.disks > TRAINED_DISKS:
-        trainings |= {
-            f"{name}-{BYSTANDER}": setup.train_beside_bystander(name, SEEDS[scale])
-            for name in BESIDE
-        }
+    more_disks = table.disks > TRAINED_DISKS
+    for name in BESIDE if more_disks else ():
+        beside = setup.train_beside_bystander(name, SEEDS[scale])
+        trainings[f"{name}-{BYSTANDER}"] = beside
     result = setup.compare(trainings, tests)
-    if table.disks > TRAINED_DISKS:
+    if more_disks:
         result["as_trained"] = setup.compare(trainings, setup.test_pushes())
     result["published"] = published_rows(table.published)
     return chain.finish(result)
