@@ -100,28 +100,6 @@ def _head() -> str:
     )
 
 
-def _robot() -> str:
-    words = _reproduce("robot-planar")
-    return (
-        f"`sainet {' '.join(words)}`: 4,500 pushes, 10,000 iterations, 500 test "
-        "pushes, three trainings of each network (intervals are over pushes and "
-        "trainings). Published rows are the paper's Table III, whose truth is Bullet "
-        "with the paper's noise.\n\n"
-        f"{to_markdown(_run(*words))}\n{_trainings(RUNS / 'robot-planar-paper')}"
-    )
-
-
-def _trainings(folder: Path) -> str:
-    """Say on how many devices each network was trained, and how it ended."""
-    lines = ["| network | devices | last loss |", "| :-- | --: | --: |"]
-    for path in sorted((ROOT / folder).glob("*/card.json")):
-        card = json.loads(path.read_text("utf-8"))
-        devices = card["manifest"]["devices"]
-        name = path.parent.name
-        lines.append(f"| `{name}` | {devices} | {card['final_loss']:.3f} |")
-    return "\n".join(lines) + "\n"
-
-
 def _imported() -> Path:
     data = RUNS / "recorded"
     file = _recorded_folder() / "ellip1_endpoints.csv"
@@ -498,7 +476,6 @@ SECTIONS = {
             reading=of_groups,
         ),
     ),
-    "robot": ("Robot setup, planar truth with noise, planar assumed engine", _robot),
     "regularisation": ("The choice of l2", _regularisation),
     "recorded": ("Recorded pushes (real), planar engine", _recorded),
     "identified": ("Recorded pushes (real), engine identified", _identified),
