@@ -83,6 +83,24 @@ def test_a_worker_that_is_ended_is_told_of_and_the_way_out():
     assert told.value.exit_status == 1
 
 
+def affinity(index: int) -> tuple[set[int], int]:
+    """What a worker may use; it takes a while, for the other one to begin as well."""
+    time.sleep(0.5)
+    return os.sched_getaffinity(0), core_count()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="Linux alone has it")
+def test_workers_with_a_core_each_share_the_cores_evenly():
+    cores, workers = os.sched_getaffinity(0), 2
+    with worker_pool(workers, core_each=True) as pool:
+        found = list(pool.map(affinity, range(4)))
+    assert all(count == 1 and len(own) == 1 for own, count in found)
+    assert set().union(*(own for own, _ in found)) <= cores
+    assert len({*map(tuple, (own for own, _ in found))}) == min(workers, len(cores))
+    with worker_pool(1) as pool:
+        assert pool.submit(affinity, 0).result()[0] == cores
+
+
 def test_cores_are_counted_where_affinity_is_unknown(monkeypatch):
     assert 1 <= core_count() <= (os.cpu_count() or 1)
     monkeypatch.delattr(os, "sched_getaffinity")

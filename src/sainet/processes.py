@@ -7,8 +7,10 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from itertools import cycle, islice
+from multiprocessing.queues import SimpleQueue
 from typing import Any, final
 
 from sainet.errors import BadInput, SainetError
@@ -22,39 +24,59 @@ def core_count() -> int:
 
 
 @contextmanager
-def worker_pool(workers: int | None) -> Iterator[Executor]:
+def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Executor]:
     """Give a pool of processes, as many as there are cores by default.
 
-    Ctrl-C reaches the jobs under way as `KeyboardInterrupt`, so that they may keep what
-    they have; none begins after it.
+    Ctrl-C, or any failure here, reaches the jobs under way as `KeyboardInterrupt`, so
+    that they may keep what they have; none begins after it.
+
+    Args:
+        workers: how many processes.
+        core_each: see `spawned_pool`.
 
     Raises:
         BadInput: fewer than one worker.
     """
     if workers is not None and workers < 1:
         raise BadInput(f"--workers is {workers}; it must be at least 1.")
-    pool = spawned_pool(workers or core_count())
+    pool = spawned_pool(workers or core_count(), core_each=core_each)
     try:
         yield pool
-    except KeyboardInterrupt:
+    except BaseException:
         # A terminal tells every process; whoever signals this one alone does not.
         for process in multiprocessing.active_children():
             if process.pid is not None:
-                os.kill(process.pid, signal.SIGINT)
+                with suppress(ProcessLookupError):  # it may have ended meanwhile
+                    os.kill(process.pid, signal.SIGINT)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def spawned_pool(workers: int) -> Executor:
+def spawned_pool(workers: int, *, core_each: bool = False) -> Executor:
     """Return a pool of processes that end with this one, quietly at Ctrl-C.
 
     Spawned, not forked: a process that is forked after JAX has started hangs.
+
+    Args:
+        workers: how many processes.
+        core_each: keep each to a core of its own, where the system can. To what runs
+            there this is a machine of one core, which spares it threads.
     """
     context = multiprocessing.get_context("spawn")
+    cores = context.SimpleQueue()
+    for core in islice(cycle(_cores()), workers if core_each else 0):
+        cores.put(core)
     return _InterruptibleExecutor(
-        ProcessPoolExecutor(workers, mp_context=context, initializer=_begin_worker)
+        ProcessPoolExecutor(
+            workers, mp_context=context, initializer=_begin_worker, initargs=(cores,)
+        )
     )
+
+
+def _cores() -> list[int]:
+    """Return the cores that processes can be kept to; none where they cannot."""
+    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
 
 
 @final
@@ -90,8 +112,10 @@ class _WorkerState:
 _worker = _WorkerState()  # one a process, as signal handlers are
 
 
-def _begin_worker() -> None:
+def _begin_worker(cores: "SimpleQueue[int]") -> None:
     end_with_parent()
+    if not cores.empty():  # one waits for each worker, or none for any
+        os.sched_setaffinity(0, {cores.get()})
     # A shell has its background jobs ignore the signal; so do their workers.
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _interrupt)

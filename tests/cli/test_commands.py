@@ -48,6 +48,7 @@ def test_without_words_the_help_is_shown():
         (("generate", "robot", "--mass-kg", "nan"), ("--mass-kg", "positive")),
         (("generate", "robot", "--gap-mm", "-2"), ("--gap-mm", "overlap")),
         (("generate", "robot", "--workers", "0"), ("--workers", "at least 1")),
+        (("reproduce", "--trainers", "0"), ("--trainers", "at least 1")),
     ],
 )
 def test_bad_settings_are_named_and_nothing_is_made(tmp_path, words, names):

@@ -100,6 +100,15 @@ def test_all_that_can_be_made_is_told_even_when_quiet(begun, monkeypatch, capsys
     assert bullet.startswith("Left out without PyBullet: direct-force-two-disks, ")
 
 
+def test_several_trainings_at_once_are_refused_on_one_gpu(begun, monkeypatch):
+    monkeypatch.setattr("jax.default_backend", lambda: "gpu")
+    with pytest.raises(BadInput, match="--trainers is 2; on a GPU it must be 1"):
+        Reproduce(experiments=("robot-planar",), trainers=2).run()
+    assert begun == []
+    Reproduce(experiments=("robot-planar",)).run()
+    assert begun == ["robot-planar-quick"]
+
+
 def test_the_help_names_every_experiment():
     source = (SOURCE / "cli" / "reproduce.py").read_text("utf-8")
     assert all(name in source for name in EXPERIMENTS)

@@ -1,6 +1,8 @@
 """`sainet reproduce`."""
 
 from collections.abc import Callable
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
@@ -12,8 +14,9 @@ from tyro.conf import Positional
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
+from sainet.errors import BadInput
 from sainet.experiments.config import Scale
-from sainet.processes import worker_pool
+from sainet.processes import core_count, worker_pool
 
 if TYPE_CHECKING:
     from sainet.experiments.chain import Chain
@@ -36,6 +39,10 @@ class Reproduce:
     """Folder to write, a folder in it for each experiment."""
     recorded: Path | None = None
     """Dataset of recorded pushes: what 'sainet import mitpush-endpoints' made."""
+    trainers: int | None = None
+    """Networks to train at once, each on a core of its own, about 1 GB each; 1 trains
+    one by one, with its batch split over all devices. Default: one a core; 1 on a
+    GPU."""
     devices: int | None = None
     """CPU devices to split a batch over; default: one a core."""
     output: Output = field(default_factory=Output)
@@ -49,8 +56,8 @@ class Reproduce:
 
         tables: dict[str, Any] = {}
         bar = partial(progress_bar, output=self.output)
-        with worker_pool(None) as pool:
-            chain = Chain(self.out, pool, self.output.say, bar, self.recorded)
+        with worker_pool(None) as pool, self._trainer_pool() as trainers:
+            chain = Chain(self.out, pool, self.output.say, bar, self.recorded, trainers)
             for name, make in self._look_up(chain).items():
                 own = replace(chain, out=self.out / f"{name}-{self.scale}")
                 tables[name] = make(self.scale, own)
@@ -58,6 +65,24 @@ class Reproduce:
                 show(tables[name], self.output.console)
         only = next(iter(tables.values()))
         return only if len(tables) == 1 else {"experiments": tables}
+
+    def _trainer_pool(self) -> AbstractContextManager[Executor | None]:
+        """Return the processes that train at once; none where one is trained alone.
+
+        Raises:
+            BadInput: fewer than one is wanted, or several on one GPU.
+        """
+        import jax
+
+        is_cpu = jax.default_backend() == "cpu"
+        count = self.trainers
+        if count is None:
+            count = core_count() if is_cpu else 1
+        if count < 1:
+            raise BadInput(f"--trainers is {count}; it must be at least 1.")
+        if count > 1 and not is_cpu:
+            raise BadInput(f"--trainers is {count}; on a GPU it must be 1.")
+        return worker_pool(count, core_each=True) if count > 1 else nullcontext()
 
     def _look_up(self, chain: "Chain") -> dict[str, Callable[..., dict[str, Any]]]:
         """Return what makes each table; what cannot be had is said before any runs."""

@@ -1,9 +1,9 @@
 """The chain that every experiment walks: simulate, train, compare."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,12 @@ from sainet.datasets.generate import generate
 from sainet.datasets.store import Store, open_store
 from sainet.errors import BadInput
 from sainet.evaluation.evaluate import Evaluation, evaluate
+from sainet.experiments.trainings import Training, train_at_once
 from sainet.models.named import NamedDynamics
 from sainet.models.registry import PHYSICS, load_dynamics
 from sainet.runs import CONFIG, MANIFEST, manifest, write_json
 from sainet.training.config import FitConfig, ModelKind
-from sainet.training.fit import FitResult, fit
+from sainet.training.fit import FitResult
 
 TABLE = "table.json"
 Advance = Callable[[int, str], None]
@@ -32,6 +33,7 @@ class Chain:
     say: Callable[[str], None]
     bar: Bar
     recorded: Path | None = None  # dataset of recorded pushes, for what needs one
+    trainers: Executor | None = None  # for several networks at once; None: one by one
 
     def simulate(self, name: str, config: GenerateConfig) -> Store:
         """Generate a dataset into a folder of that name."""
@@ -54,49 +56,53 @@ class Chain:
         start_from: str | None = None,
     ) -> FitResult:
         """Train a network into a folder of that name, by default of its own."""
-        done, name = 0, name or model
-        with self.bar(f"Training {name.upper()}", config.iterations) as advance:
+        out = self.out / (name or model)
+        return self._train(
+            Training(model, store, config, out, assumed_engine, start_from)
+        )
 
-            def on_step(iteration: int, loss: float) -> None:
-                nonlocal done
-                advance(iteration - done, f"loss {loss:.3g}")
-                done = iteration
+    def train_seeds(
+        self, trainings: Mapping[str, Training], seeds: Sequence[int]
+    ) -> dict[str, list[str]]:
+        """Train every network from every seed; returns the names of their folders.
 
-            return fit(
-                model,
-                store,
-                config,
-                self.out / name,
-                assumed_engine=assumed_engine,
-                start_from=start_from,
-                on_step=on_step,
-            )
-
-    def train_several(
-        self,
-        model: ModelKind,
-        store: Store,
-        config: FitConfig,
-        seeds: Sequence[int],
-        *,
-        name: str | None = None,
-        assumed_engine: str = "planar",
-        start_from: str | None = None,
-    ) -> list[str]:
-        """Train a network from several seeds; returns the names of their folders.
-
-        With the name of another network, each goes on from the one of its own seed.
+        None goes on from another, so that they are trained at once where that is
+        given. What is finished is looked at here: no process has to begin for it.
         """
-        for seed in seeds:
-            self.train(
-                model,
-                store,
-                replace(config, seed=seed),
-                name=of_seed(name or model, seed),
-                assumed_engine=assumed_engine,
-                start_from=start_from and str(self.out / of_seed(start_from, seed)),
-            )
-        return [of_seed(name or model, seed) for seed in seeds]
+        several = {name: one.of_seeds(seeds) for name, one in trainings.items()}
+        every = [training for those in several.values() for training in those]
+        left = [training for training in every if not training.is_finished]
+        if self.trainers is None or left == left[:1]:
+            left = []
+        for training in every:
+            if training not in left:
+                self._train(training)
+        if self.trainers is not None and left:
+            total = sum(training.config.iterations for training in left)
+            with self._counting(f"Training {len(left)} networks", total) as on_step:
+                train_at_once(left, self.trainers, on_step)
+        return {name: [one.name for one in those] for name, those in several.items()}
+
+    def _train(self, training: Training) -> FitResult:
+        total = training.config.iterations
+        with self._counting(f"Training {training.name.upper()}", total) as on_step:
+            result = training.run(lambda done, loss: on_step(done, f"loss {loss:.3g}"))
+            last = result.history[-1:]
+            on_step(total, "".join(f"loss {line['loss']:.3g}" for line in last))
+        return result
+
+    @contextmanager
+    def _counting(self, title: str, total: int) -> Iterator[Advance]:
+        """Show a bar that is told how much is done, not how much more."""
+        shown = 0
+        with self.bar(title, total) as advance:
+
+            def on_step(done: int, note: str) -> None:
+                nonlocal shown
+                advance(done - shown, note)
+                shown = done
+
+            yield on_step
 
     def compare_trainings(
         self,
@@ -160,8 +166,3 @@ class Chain:
         folders = [str(self.out / name) for name in networks]
         physics = [load_dynamics(name, engine=engine) for name in PHYSICS]
         return [*physics, *map(load_dynamics, folders)]
-
-
-def of_seed(name: str, seed: int) -> str:
-    """Return the name of a training's folder."""
-    return f"{name}-seed-{seed}"

@@ -26,11 +26,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     recipes = {f"{n:,}": _shorter(setup, n) for n in PUSHES[scale]} | {IN_FULL: {}}
     tests = setup.test_pushes()
     tables = [
-        setup.compare(
-            {name: setup.train(name, SEEDS[scale], **recipe) for name in NETWORKS},
-            tests,
-            group=group,
-        )
+        setup.compare(setup.train(NETWORKS, SEEDS[scale], **recipe), tests, group=group)
         for group, recipe in recipes.items()
     ]
     draw_data_efficiency(join(tables[:-1]), chain.out / "data-efficiency.svg")

@@ -14,7 +14,8 @@ from sainet.datasets.store import Store
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.few_pushes import recipe
-from sainet.training.config import FitConfig, ModelKind
+from sainet.experiments.trainings import Training
+from sainet.training.config import FitConfig
 
 AROUND = {
     "sain-bullet": "bullet",
@@ -76,34 +77,32 @@ class PaperSetup:
 
     def train(
         self,
-        name: str,
+        names: Sequence[str],
         seeds: Sequence[int],
         *,
         form: str = "",
         pushes: int | None = None,
         **changes: Any,  # noqa: ANN401
-    ) -> list[str]:
-        """Train one of `NETWORKS`; returns the names of the trainings' folders.
+    ) -> dict[str, list[str]]:
+        """Train some of `NETWORKS`; returns the names of each one's folders.
 
         Args:
-            name: of the network.
-            seeds: a training for each.
+            names: of the networks.
+            seeds: a training of each network for each.
             form: of the training, where it is not the usual one: goes into the names.
             pushes: how many of the training pushes to use; None is all.
             changes: settings of the training that are not the paper's.
         """
         count = self.sizes.pushes if pushes is None else pushes
         usual = FitConfig(iterations=self.sizes.iterations, batch_size=min(100, count))
-        return self.chain.train_several(
-            _kind(name),
-            self.training_pushes().first(count),
-            replace(usual, **changes),
-            seeds,
-            name="-".join(part for part in (name, form) if part),
-            assumed_engine=AROUND.get(name, "planar"),
+        store, config = self.training_pushes().first(count), replace(usual, **changes)
+        return self.chain.train_seeds(
+            {name: self._training(name, store, config, form) for name in names}, seeds
         )
 
-    def train_beside_bystander(self, name: str, seeds: Sequence[int]) -> list[str]:
+    def train_beside_bystander(
+        self, names: Sequence[str], seeds: Sequence[int]
+    ) -> dict[str, list[str]]:
         """Let trained ones of `NETWORKS` go on, beside a disk that nothing touches.
 
         With the settings that hold for going on from any network, but for the steps,
@@ -111,14 +110,22 @@ class PaperSetup:
         """
         store = self.training_pushes_with_bystander()
         changes = {"steps": FitConfig.steps}
-        return self.chain.train_several(
-            _kind(name),
+        trainings = {}
+        for name in names:
+            config = recipe(name, self.scale, store.info.pushes, changes)
+            training = self._training(name, store, config, BYSTANDER)
+            trainings[name] = replace(training, start_from=str(self.chain.out / name))
+        return self.chain.train_seeds(trainings, seeds)
+
+    def _training(
+        self, name: str, store: Store, config: FitConfig, form: str
+    ) -> Training:
+        return Training(
+            "in" if name == "in" else "sain",
             store,
-            recipe(name, self.scale, store.info.pushes, changes),
-            seeds,
-            name=f"{name}-{BYSTANDER}",
-            assumed_engine=AROUND.get(name, "planar"),
-            start_from=name,
+            config,
+            self.chain.out / with_form(name, form),
+            AROUND.get(name, "planar"),
         )
 
     def compare(
@@ -147,8 +154,9 @@ class PaperSetup:
         return self.chain.simulate(name, config)
 
 
-def _kind(name: str) -> ModelKind:
-    return "in" if name == "in" else "sain"
+def with_form(name: str, form: str) -> str:
+    """Return what a network is called whose training has a form of its own."""
+    return "-".join(part for part in (name, form) if part)
 
 
 def paper_setup(setup: Setup, scale: Scale, chain: Chain) -> PaperSetup:

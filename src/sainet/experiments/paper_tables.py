@@ -13,7 +13,12 @@ from typing import Any
 from sainet.datasets.config import Setup
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
-from sainet.experiments.paper_setup import BYSTANDER, NETWORKS, paper_setup
+from sainet.experiments.paper_setup import (
+    BYSTANDER,
+    NETWORKS,
+    paper_setup,
+    with_form,
+)
 from sainet.experiments.published import (
     DIRECT_FORCE_THREE_DISKS,
     DIRECT_FORCE_TWO_DISKS,
@@ -68,11 +73,11 @@ def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
     """
     setup = paper_setup(table.setup, scale, chain)
     tests = setup.test_pushes(f"test-{table.disks}-disks", disks=table.disks)
-    trainings = {name: setup.train(name, SEEDS[scale]) for name in NETWORKS}
+    trainings = setup.train(NETWORKS, SEEDS[scale])
     more_disks = table.disks > TRAINED_DISKS
-    for name in BESIDE if more_disks else ():
-        beside = setup.train_beside_bystander(name, SEEDS[scale])
-        trainings[f"{name}-{BYSTANDER}"] = beside
+    if more_disks:
+        beside = setup.train_beside_bystander(BESIDE, SEEDS[scale])
+        trainings |= {with_form(name, BYSTANDER): beside[name] for name in BESIDE}
     result = setup.compare(trainings, tests)
     if more_disks:
         result["as_trained"] = setup.compare(trainings, setup.test_pushes())

@@ -8,7 +8,7 @@ from typing import Any
 
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
-from sainet.experiments.paper_setup import paper_setup
+from sainet.experiments.paper_setup import paper_setup, with_form
 
 SEEDS = {"quick": range(1), "paper": range(3)}
 NETWORKS = ("in", "sain")
@@ -18,10 +18,8 @@ SINGLE = "single-steps"
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Train IN and SAIN both ways on the robot setup; returns the table."""
     setup = paper_setup("robot", scale, chain)
-    trainings = {name: setup.train(name, SEEDS[scale]) for name in NETWORKS}
-    for name in NETWORKS:
-        trainings[f"{name}-{SINGLE}"] = setup.train(
-            name, SEEDS[scale], form=SINGLE, recurrent=False
-        )
+    trainings = setup.train(NETWORKS, SEEDS[scale])
+    single = setup.train(NETWORKS, SEEDS[scale], form=SINGLE, recurrent=False)
+    trainings |= {with_form(name, SINGLE): single[name] for name in NETWORKS}
     table = setup.compare(trainings, setup.test_pushes())
     return chain.finish(table)

@@ -28,9 +28,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     tables, choices = [], []
     for l2 in CHOICES:
         form = "" if l2 == FitConfig.l2 else f"l2-{l2:g}"
-        trainings = {
-            name: setup.train(name, SEEDS, form=form, l2=l2) for name in NETWORKS
-        }
+        trainings = setup.train(NETWORKS, SEEDS, form=form, l2=l2)
         table = setup.compare(trainings, validation, group=f"l2 {l2:g}")
         choices.append({"l2": l2, "score": score(table)})
         tables.append(table)

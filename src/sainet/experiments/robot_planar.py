@@ -9,6 +9,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.experiments.chain import Chain
 from sainet.experiments.config import Scale
 from sainet.experiments.published import ROBOT_TWO_DISKS, published_rows
+from sainet.experiments.trainings import Training
 from sainet.training.config import FitConfig, ModelKind
 
 _SIZES = {"quick": (1000, 200, 500), "paper": (4500, 500, 10_000)}
@@ -29,9 +30,10 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     test = chain.simulate("test", GenerateConfig(pushes=tests, seed=1))
     config = FitConfig(iterations=iterations)
     trainings = {
-        str(model): chain.train_several(model, train, config, _SEEDS[scale])
+        str(model): Training(model, train, config, chain.out / model)
         for model in _MODELS
     }
-    table = chain.compare_trainings(trainings, test).to_dict()
+    made = chain.train_seeds(trainings, _SEEDS[scale])
+    table = chain.compare_trainings(made, test).to_dict()
     table["published"] = published_rows(ROBOT_TWO_DISKS)
     return chain.finish(table)

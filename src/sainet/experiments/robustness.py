@@ -25,7 +25,7 @@ _SEED = 11
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Compare the networks of Table III on pushes that differ; returns the table."""
     setup = paper_setup("robot", scale, chain)
-    trainings = {name: setup.train(name, SEEDS[scale]) for name in NETWORKS}
+    trainings = setup.train(NETWORKS, SEEDS[scale])
     table = join(
         [
             setup.compare(trainings, tests, group=group)
