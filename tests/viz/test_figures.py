@@ -119,6 +119,14 @@ def test_unknown_models_get_colours_of_their_own():
     assert len(style_of("runs/" + 60 * "x").label) <= 40
 
 
+def test_a_network_of_another_form_is_called_after_the_one_that_is_known():
+    label = style_of("sain-bullet-bystander").label
+    assert label == "SAIN around Bullet, bystander"
+    assert style_of("in-single-steps").label == "IN, single steps"
+    for unknown in ("runs/in-bystander", "in-bystanders", "-bystander"):
+        assert style_of(unknown).label == unknown
+
+
 def test_lines_are_told_apart_without_their_colours():
     others = ("physics-calibrated", "in", "sain-bullet", "sain-calibrated")
     styles = styles_of([*others, *(f"runs/{number}" for number in range(6))])

@@ -21,6 +21,8 @@ _EPISODE = {
     "--other": (OTHER, "#9aa0a6"),
     "--target": (TARGET, "#d9b40a"),
 }
+# What a training of another form adds to a network's name, and to its label.
+_FORMS = {"-bystander": ", bystander", "-single-steps": ", single steps"}
 _LONGEST = 40  # characters of a label; of a longer name, a folder say, the end counts
 
 
@@ -102,5 +104,11 @@ def _spare_style(name: str, taken: set[int]) -> ModelStyle:
         slot = (slot + 1) % len(_SPARE)
     taken.add(slot)
     color, dark, dash = _SPARE[slot]
-    label = name if len(name) <= _LONGEST else f"…{name[1 - _LONGEST :]}"
-    return ModelStyle(name, label, color, dark, dash)
+    return ModelStyle(name, _spare_label(name), color, dark, dash)
+
+
+def _spare_label(name: str) -> str:
+    for ending, told in _FORMS.items():
+        if name.removesuffix(ending) in _KNOWN and name.endswith(ending):
+            return _KNOWN[name.removesuffix(ending)].label + told
+    return name if len(name) <= _LONGEST else f"…{name[1 - _LONGEST :]}"
