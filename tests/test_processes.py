@@ -83,6 +83,26 @@ def test_a_worker_that_is_ended_is_told_of_and_the_way_out():
     assert told.value.exit_status == 1
 
 
+def long_job(began: Path):
+    """A job that somebody has to interrupt."""
+    began.touch()
+    time.sleep(60)
+
+
+def test_a_failure_ends_what_is_under_way_in_this_pool_alone(tmp_path):
+    with worker_pool(1) as other:
+        other.submit(core_count).result()  # its process is there, and idle
+        with pytest.raises(ZeroDivisionError), worker_pool(2) as pool:
+            for index in range(3):
+                pool.submit(long_job, tmp_path / f"began-{index}")
+            wait_for(tmp_path, "began-*", 2)
+            failed = time.monotonic()
+            raise ZeroDivisionError
+        assert time.monotonic() - failed < 30
+        assert len(list(tmp_path.glob("began-*"))) == 2
+        assert other.submit(core_count).result() == core_count()
+
+
 def affinity(index: int) -> tuple[set[int], int]:
     """What a worker may use; it takes a while, for the other one to begin as well."""
     time.sleep(0.5)

@@ -59,7 +59,7 @@ def build(setup: "PaperSetup", into: Path) -> None:
     from sainet.models.registry import OF_PAPER
 
     for name in OF_PAPER:
-        (folder,) = setup.train(name, (SEED,))
+        (folder,) = setup.train((name,), (SEED,))[name]
         _ship(name, setup.chain, folder, into)
 
 

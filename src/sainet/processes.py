@@ -42,18 +42,20 @@ def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Exe
     pool = spawned_pool(workers or core_count(), core_each=core_each)
     try:
         yield pool
-    except BaseException:
+    except KeyboardInterrupt:
         # A terminal tells every process; whoever signals this one alone does not.
         for process in multiprocessing.active_children():
             if process.pid is not None:
-                with suppress(ProcessLookupError):  # it may have ended meanwhile
-                    os.kill(process.pid, signal.SIGINT)
+                _signal(process.pid)
+        raise
+    except BaseException:
+        pool.interrupt()
         raise
     finally:
         pool.shutdown(cancel_futures=True)
 
 
-def spawned_pool(workers: int, *, core_each: bool = False) -> Executor:
+def spawned_pool(workers: int, *, core_each: bool = False) -> "InterruptibleExecutor":
     """Return a pool of processes that end with this one, quietly at Ctrl-C.
 
     Spawned, not forked: a process that is forked after JAX has started hangs.
@@ -67,11 +69,11 @@ def spawned_pool(workers: int, *, core_each: bool = False) -> Executor:
     cores = context.SimpleQueue()
     for core in islice(cycle(_cores()), workers if core_each else 0):
         cores.put(core)
-    return _InterruptibleExecutor(
-        ProcessPoolExecutor(
-            workers, mp_context=context, initializer=_begin_worker, initargs=(cores,)
-        )
+    begun = context.SimpleQueue()
+    pool = ProcessPoolExecutor(
+        workers, context, initializer=_begin_worker, initargs=(cores, begun)
     )
+    return InterruptibleExecutor(pool, begun)
 
 
 def _cores() -> list[int]:
@@ -80,11 +82,18 @@ def _cores() -> list[int]:
 
 
 @final
-class _InterruptibleExecutor(Executor):
+class InterruptibleExecutor(Executor):
     """Does jobs in a pool of processes; none begins in an interrupted one."""
 
-    def __init__(self, pool: ProcessPoolExecutor) -> None:
+    def __init__(self, pool: ProcessPoolExecutor, begun: "SimpleQueue[int]") -> None:
+        """Have the pool, and what tells the numbers of its processes."""
         self._pool = pool
+        self._begun = begun
+
+    def interrupt(self) -> None:
+        """Have the jobs under way end as at Ctrl-C, and no more begin."""
+        while not self._begun.empty():
+            _signal(self._begun.get())
 
     def submit(
         self,
@@ -112,13 +121,19 @@ class _WorkerState:
 _worker = _WorkerState()  # one a process, as signal handlers are
 
 
-def _begin_worker(cores: "SimpleQueue[int]") -> None:
+def _signal(process: int) -> None:
+    with suppress(ProcessLookupError):  # it may have ended meanwhile
+        os.kill(process, signal.SIGINT)
+
+
+def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
     end_with_parent()
     if not cores.empty():  # one waits for each worker, or none for any
         os.sched_setaffinity(0, {cores.get()})
     # A shell has its background jobs ignore the signal; so do their workers.
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _interrupt)
+        begun.put(os.getpid())
 
 
 def _interrupt(number: int, frame: object) -> None:

@@ -74,7 +74,7 @@ def test_errors_stand_in_relation_to_physics_and_to_what_a_model_is_compared_wit
 
 
 def test_what_a_bystander_taught_and_cost_is_told():
-    taught = "sain-bystander"
+    taught, called = "sain-bystander", "SAIN, bystander"
 
     def table(sain: float, beside: float) -> dict:
         return {
@@ -95,11 +95,11 @@ def test_what_a_bystander_taught_and_cost_is_told():
         }
     )
     said = "Against the network that it goes on from"
-    assert f"{said}, here: {taught} is better in pos of disk 2." in told
-    assert f"{said}, on two disks: {taught} is worse in rot of disk 1." in told
+    assert f"{said}, here: {called} is better in pos of disk 2." in told
+    assert f"{said}, on two disks: {called} is worse in rot of disk 1." in told
     first, after = told.split("| On two disks, error over that of Physics |")
-    assert f"| {taught} | 0.25 / 0.25 | 0.50 / 0.50 |" in first
-    assert f"| {taught} | 0.15 / 0.15 | 0.50 / 0.50 |" in after
+    assert f"| {called} | 0.25 / 0.25 | 0.50 / 0.50 |" in first
+    assert f"| {called} | 0.15 / 0.15 | 0.50 / 0.50 |" in after
 
 
 def test_groups_of_pushes_are_set_beside_each_other():
