@@ -35,6 +35,13 @@ class Broken(Executor):
         return future
 
 
+class Gone(Executor):
+    """Processes of which one was ended before they were given work."""
+
+    def submit(self, fn, /, *args, **kwargs):
+        raise BrokenProcessPool
+
+
 class Bars:
     """Remembers what bars were told."""
 
@@ -106,7 +113,8 @@ def test_a_training_that_fails_is_told_of_as_it_is(store, tmp_path):
         train_at_once(trainings, trainers, lambda done, note: None)
 
 
-def test_a_process_that_is_ended_is_told_of(store, tmp_path):
+@pytest.mark.parametrize("processes", [Broken(), Gone()])
+def test_a_process_that_is_ended_is_told_of(store, tmp_path, processes):
     trainings = both(store, tmp_path)["in"].of_seeds(SEEDS)
     with pytest.raises(SainetError, match="want of memory"):
-        train_at_once(trainings, Broken(), lambda done, note: None)
+        train_at_once(trainings, processes, lambda done, note: None)

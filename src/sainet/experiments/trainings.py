@@ -93,9 +93,11 @@ def train_at_once(
         SainetError: what `fit` raises, of the first that fails; or a process was ended
             from outside.
     """
-    futures = {trainers.submit(_run, training): training for training in trainings}
-    waiting = set(futures)
+    futures: dict[Future[None], Training] = {}
     try:
+        for training in trainings:
+            futures[trainers.submit(_run, training)] = training
+        waiting = set(futures)
         while waiting:
             done, waiting = wait(waiting, _LOOK_AGAIN, FIRST_COMPLETED)
             for future in done:
@@ -104,7 +106,7 @@ def train_at_once(
     except BrokenProcessPool:
         raise worker_lost() from None
     finally:
-        for future in waiting:
+        for future in futures:
             future.cancel()
 
 
