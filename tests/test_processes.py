@@ -89,6 +89,17 @@ def long_job(began: Path):
     time.sleep(60)
 
 
+@pytest.fixture(params=["foreground", "background"])
+def shell(request):
+    """A shell has its background jobs ignore what Ctrl-C sends."""
+    before = signal.getsignal(signal.SIGINT)
+    if request.param == "background":
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("shell")
 def test_a_failure_ends_what_is_under_way_in_this_pool_alone(tmp_path):
     with worker_pool(1) as other:
         other.submit(core_count).result()  # its process is there, and idle

@@ -15,6 +15,10 @@ from typing import Any, final
 
 from sainet.errors import BadInput, SainetError
 
+# What a failure sends to the workers of its own pool. Those of a background job ignore
+# SIGINT, which a shell means for what stands in the foreground.
+_FAILURE = getattr(signal, "SIGUSR1", signal.SIGINT)
+
 
 def core_count() -> int:
     """Return how many cores this process may use."""
@@ -46,7 +50,7 @@ def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Exe
         # A terminal tells every process; whoever signals this one alone does not.
         for process in multiprocessing.active_children():
             if process.pid is not None:
-                _signal(process.pid)
+                _signal(process.pid, signal.SIGINT)
         raise
     except BaseException:
         pool.interrupt()
@@ -93,7 +97,7 @@ class InterruptibleExecutor(Executor):
     def interrupt(self) -> None:
         """Have the jobs under way end as at Ctrl-C, and no more begin."""
         while not self._begun.empty():
-            _signal(self._begun.get())
+            _signal(self._begun.get(), _FAILURE)
 
     def submit(
         self,
@@ -121,9 +125,9 @@ class _WorkerState:
 _worker = _WorkerState()  # one a process, as signal handlers are
 
 
-def _signal(process: int) -> None:
+def _signal(process: int, number: int) -> None:
     with suppress(ProcessLookupError):  # it may have ended meanwhile
-        os.kill(process, signal.SIGINT)
+        os.kill(process, number)
 
 
 def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
@@ -133,7 +137,8 @@ def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
     # A shell has its background jobs ignore the signal; so do their workers.
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _interrupt)
-        begun.put(os.getpid())
+    signal.signal(_FAILURE, _interrupt)
+    begun.put(os.getpid())
 
 
 def _interrupt(number: int, frame: object) -> None:
