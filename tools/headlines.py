@@ -97,10 +97,12 @@ _TABLES = {
     "Table III: robot, two disks": "the robot, two disks",
 }
 _PREDICTED = {
-    "Physics": "an engine with assumed masses and radii",
-    "Physics, calibrated": "the same engine with true ones",
-    "IN": "a network alone (IN)",
-    "SAIN": "the network around the first engine (SAIN)",
+    "Physics": "`physics`: Bullet, assumed masses and radii",
+    "Physics, calibrated": "`physics-calibrated`: Bullet, true ones",
+    "IN": "`in`: a network alone",
+    "SAIN around Bullet": "`sain-bullet`: a network around `physics`, the paper's SAIN",
+    "SAIN": "`sain`: around the planar engine, assumed ones",
+    "SAIN, calibrated": "`sain-calibrated`: around the planar engine, true ones",
 }
 
 
