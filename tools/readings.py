@@ -144,15 +144,15 @@ def _beside_the_paper(table: Mapping[str, Any]) -> str:
         told = ", ".join(f"{_ERRORS[k]} {_slashed(v)}" for k, v in ratios.items())
         shares.append(f"{_label(name)} {told}")
     broken = [
-        f"{_ERRORS[key]} of disk {body + 1}"
+        (key, body)
         for key in _ERRORS
         for body, errors in enumerate(
-            zip(*(_errors(rows, name, key) for name in ours), strict=True)
+            zip(*(_errors(rows, name, key) for name in ours), strict=True), start=1
         )
         if list(errors) != sorted(errors, reverse=True)
     ]
     order = ", ".join(_label(name) for name in reversed(ours))
-    holds = f"does not hold in {', '.join(broken)}" if broken else "holds everywhere"
+    holds = f"does not hold in {_places(broken)}" if broken else "holds everywhere"
     return (
         f"Errors here over the published ones: {'; '.join(shares)}. The paper's order "
         f"of means ({order}, from small to large) {holds}."
@@ -214,20 +214,32 @@ def _verdicts(comparisons: Sequence[Row], models: Iterable[str], against: str) -
 
 def _verdict(comparisons: Iterable[Row], model: str, against: str) -> str:
     """Say in which errors a model is surely better or worse than another."""
-    found: dict[str, list[str]] = {"better": [], "worse": []}
+    found: dict[str, list[tuple[str, int]]] = {"better": [], "worse": []}
     for pair in comparisons:
         if (pair["model"], pair["against"]) != (model, against):
             continue
         if pair["metric"] not in _ERRORS:
             continue
         low, high = pair["interval"]
-        place = f"{_ERRORS[pair['metric']]} of disk {pair['body']}"
+        place = pair["metric"], pair["body"]
         if high < 0:
             found["better"].append(place)
         if low > 0:
             found["worse"].append(place)
-    told = [f"{word} in {', '.join(where)}" for word, where in found.items() if where]
+    told = [f"{word} in {_places(where)}" for word, where in found.items() if where]
     return " and ".join(told) or "neither better nor worse"
+
+
+def _places(found: Sequence[tuple[str, int]]) -> str:
+    """Say which errors, of which disks: "pos of disks 1 and 2, rot of disk 1"."""
+    told = []
+    for key, name in _ERRORS.items():
+        bodies = [str(body) for metric, body in found if metric == key]
+        if bodies:
+            *first, last = bodies
+            disks = f"disks {', '.join(first)} and {last}" if first else f"disk {last}"
+            told.append(f"{name} of {disks}")
+    return ", ".join(told)
 
 
 def _chance(comparisons: Iterable[Row]) -> str:

@@ -85,18 +85,18 @@ def test_what_a_bystander_taught_and_cost_is_told():
         }
 
     better = pair("pos_mm", 2, (-0.6, -0.4), "sain", model=taught)
-    worse = pair("rot_deg", 1, (0.1, 0.2), "sain", model=taught)
+    worse = [pair("rot_deg", i, (0.1, 0.2), "sain", model=taught) for i in (1, 2)]
     told = READINGS["of_errors"](
         table(1.0, 0.5)
         | {
             "published": errors("physics", (6.0, 6.0), (1.0, 1.0)),
             "comparisons": [better],
-            "as_trained": table(0.2, 0.3) | {"comparisons": [worse]},
+            "as_trained": table(0.2, 0.3) | {"comparisons": worse},
         }
     )
     said = "Against the network that it goes on from"
     assert f"{said}, here: {called} is better in pos of disk 2." in told
-    assert f"{said}, on two disks: {called} is worse in rot of disk 1." in told
+    assert f"{said}, on two disks: {called} is worse in rot of disks 1 and 2." in told
     first, after = told.split("| On two disks, error over that of Physics |")
     assert f"| {called} | 0.25 / 0.25 | 0.50 / 0.50 |" in first
     assert f"| {called} | 0.15 / 0.15 | 0.50 / 0.50 |" in after
