@@ -367,16 +367,24 @@ def _short(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+_BULLET = ("--engine", "bullet", "--assumed-engine", "bullet", "planar")
+_TIMED = {  # the words of a command, and how often it is timed
+    ("generate", "robot", "--pushes", "4500"): 3,
+    ("generate", "robot", "--pushes", "4500", *_BULLET): 3,
+    ("train", "sain", "--data", str(RUNS / "timing" / "generate")): 1,
+    ("demo",): 1,
+}
+
+
 def _speed() -> str:
     rows = [("`sainet --help`", *_several(5, SAINET, "--help"))]
-    out = ROOT / RUNS / "timing"
-    for words in (("generate", "robot", "--pushes", "4500"), ("demo",)):
-        times = []
-        for _ in range(3 if words[0] == "generate" else 1):
-            shutil.rmtree(out, ignore_errors=True)
+    for words, runs in _TIMED.items():
+        out, times = RUNS / "timing" / words[0], []
+        for _ in range(runs):
+            shutil.rmtree(ROOT / out, ignore_errors=True)
             times.append(_seconds(SAINET, *words, "--out", str(out), "--quiet"))
         rows.append((f"`sainet {' '.join(words)}`", *_median(times)))
-    shutil.rmtree(out, ignore_errors=True)
+    shutil.rmtree(ROOT / RUNS / "timing")
     lines = [f"| {name} | {value:.2f} | {runs} |" for name, value, runs in rows]
     head = "| command | seconds (median) | runs |\n| :-- | --: | --: |"
     return "\n".join([head, *lines])
