@@ -101,6 +101,14 @@ def test_filling_a_batch_up_adds_nothing(split_gradient):
     assert_same_tree(split_gradient(net, filled), plain_gradient(net, batch), 1e-5)
 
 
+def test_many_pushes_are_summed_in_chunks(split_gradient):
+    batch, net = batch_of(pushes=1101, steps=3), network("sain", "robot")
+    filled = even_batch(batch)
+    assert filled.size == 1104  # two chunks on each of two devices
+    assert even_batch(filled) is filled
+    assert_same_tree(split_gradient(net, filled), plain_gradient(net, batch), 1e-5)
+
+
 def test_unobserved_steps_pull_at_nothing(split_gradient):
     net = network("sain", "robot")
     whole = plain_gradient(net, batch_of())

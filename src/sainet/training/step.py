@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
+from jax import lax
 from jax.sharding import NamedSharding, PartitionSpec
 from jaxtyping import Array
 
@@ -19,6 +20,7 @@ from sainet.training.config import FitConfig
 from sainet.training.loss import LossWeights, push_losses
 
 _MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
+_CHUNK = 500  # pushes at a time: those of single steps are 20,000, and leave the cache
 
 Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
 
@@ -115,7 +117,7 @@ def make_gradient(
 def _sum_on_devices(
     weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
 ) -> tuple[Array, Trained]:
-    """Return loss and gradient of each device's part of a batch, device first."""
+    """Return loss and gradient of the chunks of a batch, of all devices."""
     split = jax.shard_map(
         partial(_sum_of_part, hold=hold),
         mesh=batch_mesh(),
@@ -129,11 +131,19 @@ def _sum_on_devices(
 def _sum_of_part(
     weights: LossWeights, network: InteractionNetwork, batch: PushBatch, *, hold: int
 ) -> tuple[Array, Trained]:
-    def loss(layers: Trained) -> Array:
-        return data_loss(with_layers(network, layers), batch, weights, hold)
+    """Return loss and gradient of each chunk, chunk first."""
 
-    found = jax.value_and_grad(loss)(trained_layers(network))
-    return jax.tree.map(lambda x: x[None], found)
+    def loss(layers: Trained, chunk: PushBatch) -> Array:
+        return data_loss(with_layers(network, layers), chunk, weights, hold)
+
+    gradient = partial(jax.value_and_grad(loss), trained_layers(network))
+    count = _chunk_count(batch.size)
+    chunks = jax.tree.map(lambda x: x.reshape(count, -1, *x.shape[1:]), batch)
+    return lax.map(gradient, chunks)
+
+
+def _chunk_count(pushes: int) -> int:
+    return -(-pushes // _CHUNK)
 
 
 @jax.jit
@@ -148,9 +158,8 @@ def make_step(
 
     With layers to go on from, l2 draws towards these and not towards zero.
 
-    It takes the state, on the first device, and a batch whose size the devices divide
-    (see `even_batch`), and returns the next state and the mean loss of the pushes, l2
-    left out.
+    It takes the state, on the first device, and a batch that `even_batch` has filled
+    up, and returns the next state and the mean loss of the pushes, l2 left out.
     """
     if config.l2 is None:
         raise ValueError("l2 is None; take the settings of FitConfig.for_pushes")
@@ -190,8 +199,9 @@ def _update(
 
 
 def even_batch(batch: PushBatch) -> PushBatch:
-    """Repeat the last push, unobserved, until the devices divide the batch."""
-    extra = -batch.size % jax.device_count()
+    """Repeat the last push, unobserved, until devices and chunks divide the batch."""
+    devices = jax.device_count()
+    extra = -batch.size % (devices * _chunk_count(-(-batch.size // devices)))
     if not extra:
         return batch
     padded = jax.tree.map(
