@@ -451,8 +451,9 @@ SECTIONS = {
         partial(
             _table,
             "data-efficiency",
-            "IN and SAIN on the robot setup, Bullet as the truth; three trainings "
-            "each, of 2,500 iterations, so that what differs is the data. In a group "
+            "IN and SAIN on the robot setup, Bullet as the truth, SAIN around the "
+            "assumed engine and around the calibrated one; three trainings each, "
+            "of 2,500 iterations, so that what differs is the data. In a group "
             "of their own, outside of the figure: the first three trainings of Table "
             "III, of 10,000.",
             reading=of_groups,
