@@ -24,6 +24,7 @@ def tiny(monkeypatch):
     strokes = {"quick": (4, 1)}
     monkeypatch.setattr("sainet.experiments.strokes.SIZES", strokes)
     places: dict[str, object] = {"data_efficiency.PUSHES": {"quick": (3, 6)}}
+    places["data_efficiency.AGAIN"] = 6
     places["regularisation.CHOICES"] = (1e-4, 1e-6)
     # The tables have every network; here one is enough, and compiles faster.
     for name in ("data_efficiency", "recurrent_or_not", "regularisation", "robustness"):

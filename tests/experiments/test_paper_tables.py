@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sainet.datasets.store import open_store
-from sainet.experiments.data_efficiency import IN_FULL
+from sainet.experiments.data_efficiency import IN_FULL, again
 from sainet.experiments.paper_setup import AROUND, BYSTANDER, NETWORKS
 from sainet.experiments.published import DIRECT_FORCE_THREE_DISKS, published_rows
 from sainet.experiments.regularisation import score
@@ -73,7 +73,10 @@ def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
     models = PHYSICS | {"in"}
     efficiency = make("data-efficiency")
     assert rows_of(efficiency) == {
-        (group, m, b) for group in ("3", "6", IN_FULL) for m in models for b in (1, 2)
+        (group, m, b)
+        for group in ("3", "6", again(), IN_FULL)
+        for m in models
+        for b in (1, 2)
     }
     assert (tmp_path / "data-efficiency" / "data-efficiency.svg").is_file()
     forms = make("recurrent-or-not")
