@@ -80,7 +80,9 @@ def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
     }
     assert (tmp_path / "data-efficiency" / "data-efficiency.svg").is_file()
     both = models | {"in-single-steps"}
-    assert rows_of(make("recurrent-or-not")) == {(None, m, b) for m in both for b in (1, 2)}
+    assert rows_of(make("recurrent-or-not")) == {
+        (None, m, b) for m in both for b in (1, 2)
+    }
     found = make("regularisation")
     assert [choice["l2"] for choice in found["choices"]] == [1e-4, 1e-6]
     assert all(np.isfinite(choice["score"]) for choice in found["choices"])
