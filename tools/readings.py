@@ -8,7 +8,8 @@ from sainet.viz.palette import styles_of
 
 _PHYSICS, _CALIBRATED, _ALONE = "physics", "physics-calibrated", "in"
 _BYSTANDER = "-bystander"
-_ERRORS = {"pos_mm": "pos", "rot_deg": "rot"}
+ERRORS = {"pos_mm": "pos", "rot_deg": "rot"}
+FINAL_ERRORS = {"final_pos_mm": "final pos", "final_rot_deg": "final rot"}
 _PUBLISHED = ("physics", "in", "sain-bullet")  # the paper's rows, as we name them
 
 Row = Mapping[str, Any]
@@ -86,7 +87,9 @@ def _beside_bystanders(table: Mapping[str, Any]) -> list[str]:
 
 
 def of_groups(
-    table: Mapping[str, Any], against: Mapping[str, Sequence[str]] | None = None
+    table: Mapping[str, Any],
+    against: Mapping[str, Sequence[str]] | None = None,
+    errors: Mapping[str, str] = ERRORS,
 ) -> str:
     """Set errors of several groups of pushes in relation to physics and each other.
 
@@ -94,6 +97,7 @@ def of_groups(
         table: of the errors.
         against: the models that each model is compared with; by default every SAIN
             with physics-calibrated and IN.
+        errors: that are compared, and what they are called.
     """
     rows, comparisons = table["rows"], table["comparisons"]
     models = [name for name in _models(rows) if name != _PHYSICS]
@@ -107,12 +111,12 @@ def of_groups(
     ]
     said = [
         f"- {f'*{group}*: ' if group else ''}{_label(model)} against {_label(other)}: "
-        f"{_verdict(_of_group(comparisons, group), model, other)}."
+        f"{_verdict(_of_group(comparisons, group), model, other, errors)}."
         for group in groups
         for model, others in against.items()
         for other in others
     ]
-    return "\n\n".join([*parts, "\n".join(said), _chance(comparisons)])
+    return "\n\n".join([*parts, "\n".join(said), _chance(comparisons, errors)])
 
 
 def _ratios_by_group(
@@ -140,12 +144,12 @@ def _beside_the_paper(table: Mapping[str, Any]) -> str:
     theirs = {name: name.removesuffix("-bullet") for name in ours}
     shares = []
     for name in ours:
-        ratios = {k: _over(rows, name, published, theirs[name], k) for k in _ERRORS}
-        told = ", ".join(f"{_ERRORS[k]} {_slashed(v)}" for k, v in ratios.items())
+        ratios = {k: _over(rows, name, published, theirs[name], k) for k in ERRORS}
+        told = ", ".join(f"{ERRORS[k]} {_slashed(v)}" for k, v in ratios.items())
         shares.append(f"{_label(name)} {told}")
     broken = [
         (key, body)
-        for key in _ERRORS
+        for key in ERRORS
         for body, errors in enumerate(
             zip(*(_errors(rows, name, key) for name in ours), strict=True), start=1
         )
@@ -178,7 +182,7 @@ def _worth(rows: Sequence[Row]) -> str:
 def _ratios(rows: Sequence[Row], form: str) -> list[str]:
     return [
         f"| {form.format(_label(name))} | "
-        + " | ".join(_slashed(_over_physics(rows, name, key)) for key in _ERRORS)
+        + " | ".join(_slashed(_over_physics(rows, name, key)) for key in ERRORS)
         + " |"
         for name in _models(rows)
         if name != _PHYSICS
@@ -212,13 +216,18 @@ def _verdicts(comparisons: Sequence[Row], models: Iterable[str], against: str) -
     )
 
 
-def _verdict(comparisons: Iterable[Row], model: str, against: str) -> str:
+def _verdict(
+    comparisons: Iterable[Row],
+    model: str,
+    against: str,
+    errors: Mapping[str, str] = ERRORS,
+) -> str:
     """Say in which errors a model is surely better or worse than another."""
     found: dict[str, list[tuple[str, int]]] = {"better": [], "worse": []}
     for pair in comparisons:
         if (pair["model"], pair["against"]) != (model, against):
             continue
-        if pair["metric"] not in _ERRORS:
+        if pair["metric"] not in errors:
             continue
         low, high = pair["interval"]
         place = pair["metric"], pair["body"]
@@ -226,14 +235,18 @@ def _verdict(comparisons: Iterable[Row], model: str, against: str) -> str:
             found["better"].append(place)
         if low > 0:
             found["worse"].append(place)
-    told = [f"{word} in {_places(where)}" for word, where in found.items() if where]
+    told = [
+        f"{word} in {_places(where, errors)}" for word, where in found.items() if where
+    ]
     return " and ".join(told) or "neither better nor worse"
 
 
-def _places(found: Sequence[tuple[str, int]]) -> str:
+def _places(
+    found: Sequence[tuple[str, int]], errors: Mapping[str, str] = ERRORS
+) -> str:
     """Say which errors, of which disks: "pos of disks 1 and 2, rot of disk 1"."""
     told = []
-    for key, name in _ERRORS.items():
+    for key, name in errors.items():
         bodies = [str(body) for metric, body in found if metric == key]
         if bodies:
             *first, last = bodies
@@ -242,8 +255,8 @@ def _places(found: Sequence[tuple[str, int]]) -> str:
     return ", ".join(told)
 
 
-def _chance(comparisons: Iterable[Row]) -> str:
-    count = sum(pair["metric"] in _ERRORS for pair in comparisons)
+def _chance(comparisons: Iterable[Row], errors: Mapping[str, str] = ERRORS) -> str:
+    count = sum(pair["metric"] in errors for pair in comparisons)
     return (
         "Better and worse: the 95 % interval of the paired difference leaves out 0. "
         "Where models do not differ, one in twenty does so by chance, and this table "

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from headlines import main as write_headlines
-from readings import of_control, of_errors, of_groups
+from readings import ERRORS, FINAL_ERRORS, of_control, of_errors, of_groups
 from receipts import RECEIPTS, keep, restore
 
 from sainet.control.record import read_record
@@ -451,14 +451,13 @@ SECTIONS = {
         partial(
             _table,
             "data-efficiency",
-            "IN and SAIN on the robot setup, Bullet as the truth, SAIN around the "
-            "assumed engine and around the calibrated one; three trainings each, "
-            "of 2,500 iterations, so that what differs is the data. In groups "
+            "IN and SAIN on the robot setup, Bullet as the truth; three trainings "
+            "each, of 2,500 iterations, so that what differs is the data. In groups "
             "of their own, outside of the figure: five other trainings on 500 pushes, "
             "asked for after the first three, of which every SAIN was better than "
             "every IN in the position of disk 2, and which were too few for an "
             "interval to say so; and the first three of Table III, of 10,000.",
-            reading=of_groups,
+            reading=partial(of_groups, errors=ERRORS | FINAL_ERRORS),
             figure="data-efficiency",
         ),
     ),

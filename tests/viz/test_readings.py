@@ -125,6 +125,26 @@ def test_groups_of_pushes_are_set_beside_each_other():
     assert "| fast | 3.00 / 0.50 |" in told  # rotation
     assert "- *usual*: SAIN against Physics: better in pos of disk 1." in told
     assert "- *fast*: SAIN against Physics: worse in rot of disk 1." in told
+    assert told.endswith("and this table has 3.")
+
+
+def test_groups_may_be_compared_in_other_errors():
+    rows = errors("physics", (2.0, 1.0), (1.0, 1.0))
+    rows += errors("sain", (1.0, 1.0), (1.0, 1.0))
+    told = READINGS["of_groups"](
+        {
+            "rows": [row | {"group": None} for row in rows],
+            "comparisons": [
+                pair("pos_mm", 1, (-1, 0.5), "physics", group=None),
+                pair("final_pos_mm", 2, (-1, -0.5), "physics", group=None),
+                pair("trans_percent", 2, (-1, -0.5), "physics", group=None),
+            ],
+        },
+        {"sain": ("physics",)},
+        READINGS["ERRORS"] | READINGS["FINAL_ERRORS"],
+    )
+    assert "- SAIN against Physics: better in final pos of disk 2." in told
+    assert told.endswith("and this table has 2.")
 
 
 def test_control_says_where_models_differ_in_what_they_solve():

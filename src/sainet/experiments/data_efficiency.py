@@ -12,7 +12,7 @@ from sainet.viz.efficiency import draw_data_efficiency
 PUSHES = {"quick": (50, 150, 500), "paper": (50, 150, 500, 1500, 4500)}
 SEEDS = {"quick": range(1), "paper": range(3)}
 OTHER_SEEDS = {"quick": range(1, 2), "paper": range(3, 8)}
-NETWORKS = ("in", "sain", "sain-calibrated")
+NETWORKS = ("in", "sain")
 AGAIN = 500  # pushes, with other seeds
 IN_FULL = "all, trained in full"
 _SHORTER = 4
@@ -20,9 +20,6 @@ _SHORTER = 4
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Train IN and SAIN on ever more pushes of the robot setup; returns the table.
-
-    SAIN around the calibrated engine shows how much of the gain is that of the engine:
-    all else is the same, its prediction alone is closer to the truth.
 
     Every size has a quarter of the iterations, so that what differs is the data: at the
     paper's scale that is still 55 passes over 4,500 pushes. The networks of Table III,
