@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import optax
 from jax import lax
+from jax.flatten_util import ravel_pytree
 from jax.sharding import NamedSharding, PartitionSpec
 from jaxtyping import Array
 
@@ -98,45 +99,68 @@ def make_gradient(
     The sums of the devices come together outside of what is compiled. XLA's own
     all-reduce blocks a thread of the pool that the other device works with; on two
     busy cores it was seen to wait for itself until it aborted the process.
+
+    Between devices JAX spends its time on the number of arrays, not on their size:
+    networks and gradients go as one array each. A batch goes by way of the host, where
+    it is not copied and every device takes its part.
     """
     everywhere = NamedSharding(batch_mesh(), PartitionSpec())
+    parts = NamedSharding(batch_mesh(), PartitionSpec(BATCH))
     weights = jax.device_put(weights, everywhere)
 
     def gradient(
         network: InteractionNetwork, batch: PushBatch
     ) -> tuple[Array, Trained]:
-        network = jax.device_put(network, everywhere)
-        sums = _sum_on_devices(weights, network, batch, hold)
-        return _total(jax.device_put(sums, jax.devices()[0]))
+        numbers, to_network = ravel_pytree(network)
+        numbers = jax.device_put(numbers, everywhere)
+        batch = jax.device_put(jax.device_get(batch), parts)
+        sums = _sum_on_devices(
+            weights, numbers, batch, to_network=to_network, hold=hold
+        )
+        return _total(jax.device_put(sums, jax.devices()[0]), trained_layers(network))
 
     return gradient
 
 
 # Compiled once for each set of shapes, whatever the weights, seed and settings are.
-@partial(jax.jit, static_argnames="hold")
+@partial(jax.jit, static_argnames=("to_network", "hold"))
 def _sum_on_devices(
-    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
-) -> tuple[Array, Trained]:
-    """Return loss and gradient of the chunks of a batch, of all devices."""
+    weights: LossWeights,
+    numbers: Array,
+    batch: PushBatch,
+    *,
+    to_network: Callable[[Array], InteractionNetwork],
+    hold: int,
+) -> tuple[Array, Array]:
+    """Return loss and gradient, as one row, of the chunks of all devices."""
     split = jax.shard_map(
-        partial(_sum_of_part, hold=hold),
+        partial(_sum_of_part, to_network=to_network, hold=hold),
         mesh=batch_mesh(),
         in_specs=(PartitionSpec(), PartitionSpec(), PartitionSpec(BATCH)),
         out_specs=PartitionSpec(BATCH),
         check_vma=False,
     )
-    return split(weights, network, batch)
+    return split(weights, numbers, batch)
 
 
 def _sum_of_part(
-    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, *, hold: int
-) -> tuple[Array, Trained]:
+    weights: LossWeights,
+    numbers: Array,
+    batch: PushBatch,
+    *,
+    to_network: Callable[[Array], InteractionNetwork],
+    hold: int,
+) -> tuple[Array, Array]:
     """Return loss and gradient of each chunk, chunk first."""
+    network = to_network(numbers)
 
     def loss(layers: Trained, chunk: PushBatch) -> Array:
         return data_loss(with_layers(network, layers), chunk, weights, hold)
 
-    gradient = partial(jax.value_and_grad(loss), trained_layers(network))
+    def gradient(chunk: PushBatch) -> tuple[Array, Array]:
+        found, layers = jax.value_and_grad(loss)(trained_layers(network), chunk)
+        return found, ravel_pytree(layers)[0]
+
     count = _chunk_count(batch.size)
     chunks = jax.tree.map(lambda x: x.reshape(count, -1, *x.shape[1:]), batch)
     return lax.map(gradient, chunks)
@@ -147,8 +171,10 @@ def _chunk_count(pushes: int) -> int:
 
 
 @jax.jit
-def _total(sums: tuple[Array, Trained]) -> tuple[Array, Trained]:
-    return jax.tree.map(lambda x: jnp.sum(x, axis=0), sums)
+def _total(sums: tuple[Array, Array], layers: Trained) -> tuple[Array, Trained]:
+    losses, rows = sums
+    to_layers = ravel_pytree(layers)[1]
+    return jnp.sum(losses), to_layers(jnp.sum(rows, axis=0))
 
 
 def make_step(
