@@ -371,8 +371,8 @@ _BULLET = ("--engine", "bullet", "--assumed-engine", "bullet", "planar")
 _TIMED = {  # the words of a command, and how often it is timed
     ("generate", "robot", "--pushes", "4500"): 3,
     ("generate", "robot", "--pushes", "4500", *_BULLET): 3,
-    ("train", "sain", "--data", str(RUNS / "timing" / "generate")): 1,
-    ("demo",): 1,
+    ("train", "sain", "--data", str(RUNS / "timing" / "generate")): 3,
+    ("demo",): 3,
 }
 
 
