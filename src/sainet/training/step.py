@@ -132,9 +132,15 @@ def _sum_on_devices(
     to_network: Callable[[Array], InteractionNetwork],
     hold: int,
 ) -> tuple[Array, Array]:
-    """Return loss and gradient, as one row, of the chunks of all devices."""
+    """Return the losses ``[chunk]`` and gradients ``[chunk number]`` of all devices."""
+
+    def of_part(
+        weights: LossWeights, numbers: Array, batch: PushBatch
+    ) -> tuple[Array, Array]:
+        return _sum_of_part(weights, to_network(numbers), batch, hold)
+
     split = jax.shard_map(
-        partial(_sum_of_part, to_network=to_network, hold=hold),
+        of_part,
         mesh=batch_mesh(),
         in_specs=(PartitionSpec(), PartitionSpec(), PartitionSpec(BATCH)),
         out_specs=PartitionSpec(BATCH),
@@ -144,15 +150,9 @@ def _sum_on_devices(
 
 
 def _sum_of_part(
-    weights: LossWeights,
-    numbers: Array,
-    batch: PushBatch,
-    *,
-    to_network: Callable[[Array], InteractionNetwork],
-    hold: int,
+    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
 ) -> tuple[Array, Array]:
-    """Return loss and gradient of each chunk, chunk first."""
-    network = to_network(numbers)
+    """Return the losses ``[chunk]`` and gradients ``[chunk number]`` of a device."""
 
     def loss(layers: Trained, chunk: PushBatch) -> Array:
         return data_loss(with_layers(network, layers), chunk, weights, hold)
@@ -172,6 +172,7 @@ def _chunk_count(pushes: int) -> int:
 
 @jax.jit
 def _total(sums: tuple[Array, Array], layers: Trained) -> tuple[Array, Trained]:
+    """Return the sum over all chunks, the gradient in the form of the layers."""
     losses, rows = sums
     to_layers = ravel_pytree(layers)[1]
     return jnp.sum(losses), to_layers(jnp.sum(rows, axis=0))
