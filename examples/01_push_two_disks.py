@@ -6,8 +6,9 @@ import jax.numpy as jnp
 from sainet import PlanarEngine, PushGrid, Scene
 from sainet.engines.assumed import AssumedProperties
 from sainet.models.dynamics import PhysicsDynamics, predict
-from sainet.pushes import path_controls, place_pusher, push_direction
-from sainet.scene import at_rest
+from sainet.scenes.controls import path_controls
+from sainet.scenes.pushes import place_pusher, push_direction
+from sainet.scenes.state import at_rest
 
 # One scene: two steel disks on ABS, the second in front of the first.
 scene = Scene(

@@ -6,11 +6,11 @@ import numpy as np
 from sainet import Scene, load_dynamics
 from sainet.control.episode import Turn, run_episode
 from sainet.engines import make_engine
-from sainet.engines.config import NoiseConfig
 from sainet.planning import make_planner
 from sainet.robots.simulated import SimulatedRobot
-from sainet.scene import at_rest
+from sainet.scenes.state import at_rest
 from sainet.tasks.push_to_goal import PushToGoal
+from sainet.worlds.noise_config import NoiseConfig
 
 # The world: rough, noisy, and with a friction that nobody tells the model.
 radius = jnp.array([0.054, 0.059])

@@ -19,14 +19,14 @@ from typing import TYPE_CHECKING, Any
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.processes import worker_pool
-from sainet.training.config import FitConfig
+from sainet.learning.config import FitConfig
+from sainet.runs.workers import worker_pool
 
 if TYPE_CHECKING:
-    from sainet.experiments.chain import Chain
-    from sainet.experiments.paper_setup import PaperSetup
-    from sainet.experiments.strokes import StrokeSetup
     from sainet.models.card import Card
+    from sainet.studies.chain import Chain
+    from sainet.studies.paper_setup import PaperSetup
+    from sainet.studies.strokes import StrokeSetup
 
 SEED = 0
 
@@ -40,10 +40,10 @@ def main() -> None:
     parser.add_argument("--devices", type=int)
     options = parser.parse_args()
     use_devices(options.devices)
-    from sainet.experiments.chain import Chain
-    from sainet.experiments.paper_setup import paper_setup
-    from sainet.experiments.strokes import stroke_setup
     from sainet.models.registry import PRETRAINED
+    from sainet.studies.chain import Chain
+    from sainet.studies.paper_setup import paper_setup
+    from sainet.studies.strokes import stroke_setup
 
     output = Output()
     with worker_pool(None) as pool:
@@ -73,7 +73,7 @@ def build_strokes(setup: "StrokeSetup", into: Path) -> None:
 
 def _ship(name: str, chain: "Chain", folder: str, into: Path) -> None:
     from sainet.models.card import CARD, WEIGHTS, read_card
-    from sainet.runs import write_json
+    from sainet.runs.documents import write_json
 
     target = into / name
     target.mkdir(parents=True, exist_ok=True)

@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from sainet.viz.control_table import CHANCE
-from sainet.viz.palette import styles_of
+from sainet.report.control_table import CHANCE
+from sainet.report.palette import styles_of
 
 _PHYSICS, _CALIBRATED, _ALONE = "physics", "physics-calibrated", "in"
 _BYSTANDER = "-bystander"

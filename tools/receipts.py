@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from sainet.control.trials import SUMMARY, episode_file
+from sainet.learning.log import LOG
 from sainet.models.card import CARD, WEIGHTS
-from sainet.runs import CONFIG, MANIFEST, read_json, write_bytes, write_json
-from sainet.training.log import LOG
+from sainet.runs.documents import read_json, write_bytes, write_json
+from sainet.runs.folders import CONFIG
+from sainet.runs.manifest import MANIFEST
 
 ROOT = Path(__file__).resolve().parent.parent
 RUNS, RECEIPTS = ROOT / "runs" / "results", ROOT / "receipts"

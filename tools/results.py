@@ -27,12 +27,12 @@ from receipts import RECEIPTS, keep, restore
 from sainet.control.record import read_record
 from sainet.control.trials import episode_file
 from sainet.engines.identified import CAMERA
+from sainet.learning.config import RESIDUAL_TUNING, FitConfig
 from sainet.models.registry import OF_STROKES
-from sainet.runs import manifest
-from sainet.training.config import RESIDUAL_TUNING, FitConfig
-from sainet.viz.control_table import control_markdown
-from sainet.viz.tables import to_markdown
-from sainet.viz.video import write_film
+from sainet.report.control_table import control_markdown
+from sainet.report.figures.video import write_film
+from sainet.report.tables import to_markdown
+from sainet.runs.manifest import manifest
 
 ROOT = Path(__file__).resolve().parent.parent
 SAINET = str(Path(sys.executable).with_name("sainet"))

@@ -14,19 +14,19 @@ _HOMES = {
     "AbstractEngine": "sainet.engines.base",
     "AssumedProperties": "sainet.engines.assumed",
     "ControlConfig": "sainet.control.config",
-    "FitConfig": "sainet.training.config",
-    "ForceControls": "sainet.pushes",
+    "FitConfig": "sainet.learning.config",
+    "ForceControls": "sainet.scenes.controls",
     "GenerateConfig": "sainet.datasets.config",
     "InteractionNetwork": "sainet.models.interaction",
-    "PathControls": "sainet.pushes",
+    "PathControls": "sainet.scenes.controls",
     "PlanarEngine": "sainet.engines.planar.engine",
-    "Push": "sainet.pushes",
-    "PushGrid": "sainet.pushes",
-    "Scene": "sainet.scene",
-    "State": "sainet.scene",
-    "Trajectory": "sainet.scene",
+    "Push": "sainet.scenes.pushes",
+    "PushGrid": "sainet.scenes.pushes",
+    "Scene": "sainet.scenes.scene",
+    "State": "sainet.scenes.state",
+    "Trajectory": "sainet.scenes.state",
     "evaluate": "sainet.evaluation.evaluate",
-    "fit": "sainet.training.fit",
+    "fit": "sainet.learning.fit",
     "generate": "sainet.datasets.generate",
     "identify": "sainet.identification.identify",
     "load_dynamics": "sainet.models.registry",
@@ -51,14 +51,16 @@ if TYPE_CHECKING:
     from sainet.engines.planar.engine import PlanarEngine
     from sainet.evaluation.evaluate import evaluate
     from sainet.identification.identify import identify
+    from sainet.learning.config import FitConfig
+    from sainet.learning.fit import fit
     from sainet.models.dynamics import AbstractDynamics, predict
     from sainet.models.interaction import InteractionNetwork
     from sainet.models.registry import load_dynamics
     from sainet.planning import make_planner
-    from sainet.pushes import ForceControls, PathControls, Push, PushGrid
-    from sainet.scene import Scene, State, Trajectory
-    from sainet.training.config import FitConfig
-    from sainet.training.fit import fit
+    from sainet.scenes.controls import ForceControls, PathControls
+    from sainet.scenes.pushes import Push, PushGrid
+    from sainet.scenes.scene import Scene
+    from sainet.scenes.state import State, Trajectory
 
 __all__ = [
     "AbstractDynamics",

@@ -23,10 +23,10 @@ from sainet.bench.timing import median_seconds
 from sainet.bench.training import TrainingLoop, counted_gflop
 from sainet.cli.bench import Bench
 from sainet.cli.output import Output
-from sainet.errors import BadInput, SainetError, UnknownName
+from sainet.learning.step import trained_layers, with_layers
 from sainet.models.features import Drive, FeatureSizes, Still, in_columns
 from sainet.models.interaction import InteractionNetwork
-from sainet.training.step import trained_layers, with_layers
+from sainet.runs.errors import BadInput, SainetError, UnknownName
 
 TIME_STEP = 1 / 240
 

@@ -4,10 +4,10 @@ import shlex
 
 import pytest
 
+from report.samples import record
 from sainet.cli import control
 from sainet.cli.control import Control
 from sainet.control.config import ControlConfig
-from viz.samples import record
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from contracts.transforms import Placement, renumber_scene, renumber_state
 from contracts.worlds import first_steps, later_steps, rows, together
 from models.samples import PUSHES, STEPS, dynamics, pushes
 from sainet.models.dynamics import predict
-from sainet.pushes import PathControls
-from sainet.scene import State, pack_motion
+from sainet.scenes.controls import PathControls
+from sainet.scenes.state import State, pack_motion
 
 MODELS = ("physics", "in", "sain")
 PLACES = {

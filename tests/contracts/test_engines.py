@@ -32,8 +32,10 @@ from contracts.worlds import (
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import ENGINES
 from sainet.engines.base import roll_out
-from sainet.pushes import Controls, ForceControls, PathControls
-from sainet.scene import GRAVITY, TIME_STEP, Scene, State, pair_gaps, pusher_gaps
+from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.scene import GRAVITY, TIME_STEP, Scene
+from sainet.scenes.shapes import pair_gaps, pusher_gaps
+from sainet.scenes.state import State
 
 BATCH = 32  # scenes of each kind
 STEPS = 120

@@ -7,8 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sainet.pushes import Controls, PathControls
-from sainet.scene import Scene, State
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
 
 
 class Placement(NamedTuple):

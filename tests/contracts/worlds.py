@@ -13,16 +13,10 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.sampling import Draws, draw
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
-from sainet.pushes import (
-    Controls,
-    PathControls,
-    Push,
-    force_controls,
-    path_controls,
-    place_pusher,
-    push_direction,
-)
-from sainet.scene import TIME_STEP, Scene, State, at_rest
+from sainet.scenes.controls import Controls, PathControls, force_controls, path_controls
+from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.scene import TIME_STEP, Scene
+from sainet.scenes.state import State, at_rest
 from support import require
 
 FAR = 10.0  # m, where a pusher touches nothing

@@ -9,12 +9,12 @@ import pytest
 from models.samples import Glide
 from planning.scenes import FEW, goal_ahead, scene, touching
 from sainet.control.episode import Episode, checked, distances, run_episode
-from sainet.errors import BadScene
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.base import AbstractPlanner, Found, Plan
 from sainet.planning.greedy import GreedyPlanner
-from sainet.pushes import PushGrid
 from sainet.robots.base import AbstractRobot, Recording
+from sainet.runs.errors import BadScene
+from sainet.scenes.pushes import PushGrid
 
 TASK = goal_ahead(0.05)
 MODEL = PhysicsDynamics(Glide())

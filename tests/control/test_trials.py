@@ -19,11 +19,11 @@ from sainet.control.config import ControlConfig
 from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trial import make_trial
 from sainet.control.trials import episode_file, run_trials
-from sainet.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.robots.base import Recording
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
-from sainet.runs import CONFIG as CONFIG_FILE
-from sainet.runs import read_json, write_json
+from sainet.runs.documents import read_json, write_json
+from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+from sainet.runs.folders import CONFIG as CONFIG_FILE
 from support import REPOSITORY
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)

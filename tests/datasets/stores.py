@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.errors import SainetError
+from sainet.runs.errors import SainetError
 try:
     generate(GenerateConfig(**eval(sys.argv[1])), Path(sys.argv[2]))
 except SainetError as error:

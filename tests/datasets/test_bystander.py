@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
 from sainet.datasets import bystander
 from sainet.datasets.assumed import simulate
@@ -17,9 +18,8 @@ from sainet.datasets.schema import variables
 from sainet.datasets.store import open_store
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
-from sainet.errors import BadStore
 from sainet.models.frame import push_frame
-from training.stores import info_of, made_up, write
+from sainet.runs.errors import BadStore
 
 PUSHES = 48
 

@@ -8,8 +8,8 @@ import pytest
 
 from sainet.cli.entry import run
 from sainet.datasets.config import GenerateConfig, bounds
-from sainet.engines.config import NoiseConfig
-from sainet.errors import BadInput
+from sainet.runs.errors import BadInput
+from sainet.worlds.noise_config import NoiseConfig
 from support import SOURCE
 
 NAN, INFINITE = float("nan"), float("inf")
@@ -67,7 +67,7 @@ def test_values_of_another_type_are_refused_too():
     """In a process of its own: here the checked annotations come first."""
     script = """
 from sainet.datasets.config import GenerateConfig
-from sainet.errors import BadInput
+from sainet.runs.errors import BadInput
 bad = [("setup", "pull"), ("noise_level", "loud"), ("mass_kg", ()),
        ("mass_kg", (1.0, 2.0, 3.0))]
 for name, value in bad:

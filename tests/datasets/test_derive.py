@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from learning.stores import info_of, made_up, write
 from sainet.datasets.derive import derive
 from sainet.datasets.store import open_store
-from sainet.errors import RunConflict
-from training.stores import info_of, made_up, write
+from sainet.runs.errors import RunConflict
 
 
 @pytest.fixture

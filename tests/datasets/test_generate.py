@@ -20,7 +20,7 @@ from sainet.datasets import writer
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
-from sainet.errors import BadInput, Diverged, MissingExtra, RunConflict
+from sainet.runs.errors import BadInput, Diverged, MissingExtra, RunConflict
 from support import require
 
 
@@ -92,7 +92,7 @@ def _stop_at_write(monkeypatch, moment: int):
         yield temporary
         temporary.replace(path)
 
-    monkeypatch.setattr("sainet.runs.atomic_path", atomic_path)
+    monkeypatch.setattr("sainet.runs.documents.atomic_path", atomic_path)
 
 
 def test_killed_after_the_last_write_leaves_nothing_behind(whole_store, tmp_path):

@@ -15,7 +15,7 @@ from sainet.datasets.batch import to_batch
 from sainet.datasets.recorded.mitpush.endpoint_mat import FIELDS
 from sainet.datasets.recorded.mitpush.endpoints import import_endpoints
 from sainet.datasets.store import Store, open_store
-from sainet.errors import BadInput, BadStore, BadTable, RunConflict
+from sainet.runs.errors import BadInput, BadStore, BadTable, RunConflict
 
 GROUPS = ("abs-10", "abs-20", "plywood-10")
 

@@ -10,7 +10,7 @@ from scipy.io import savemat
 from sainet.datasets.recorded.mitpush.endpoint_csv import NUMBERS
 from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog, read_log
 from sainet.datasets.recorded.mitpush.endpoint_mat import FIELDS
-from sainet.errors import BadTable
+from sainet.runs.errors import BadTable
 
 ROW = {
     **{"surface": "abs", "shape": "ellip1", "vel_mm_s": 10.0, "s": 0.025, "t": -0.349},

@@ -27,7 +27,7 @@ from datasets.stores import assert_same_files, contents
 from sainet.datasets.batch import to_batch
 from sainet.datasets.recorded import arrays, files
 from sainet.datasets.recorded.mitpush.raw import import_mitpush
-from sainet.errors import BadInput, BadTable, MissingExtra, RunConflict
+from sainet.runs.errors import BadInput, BadTable, MissingExtra, RunConflict
 
 WITHIN = 0.0017 + np.arange(1, 239) / 240  # s: steps that were recorded
 

@@ -5,8 +5,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from learning.stores import info_of, made_up, write
 from sainet.datasets.reader import BatchReader, ChunkCache
-from training.stores import info_of, made_up, write
 
 PUSHES, CHUNK = 40, 5
 NAMES = ("mass", "truth", "steps")

@@ -6,8 +6,8 @@ import pytest
 from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.sampling import chunk_generator, draw
-from sainet.errors import BadInput
-from sainet.scene import pusher_gaps
+from sainet.runs.errors import BadInput
+from sainet.scenes.shapes import pusher_gaps
 
 
 def drawn(pushes=400, **settings):

@@ -9,8 +9,9 @@ from datasets.stores import small
 from sainet.datasets.batch import to_batch, to_controls, to_initial, to_scene
 from sainet.datasets.schema import sizes, variables
 from sainet.datasets.simulate import simulate_chunk, store_info
-from sainet.pushes import ForceControls, PathControls
-from sainet.scene import TIME_STEP, pair_gaps, pusher_gaps
+from sainet.scenes.controls import ForceControls, PathControls
+from sainet.scenes.scene import TIME_STEP
+from sainet.scenes.shapes import pair_gaps, pusher_gaps
 
 # One disk that is what the assumed engine takes it for.
 AS_ASSUMED = {

@@ -10,8 +10,8 @@ import pytest
 from sainet.datasets.schema import StoreInfo, variables
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
-from sainet.errors import BadStore
-from sainet.runs import content_hash
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import BadStore
 
 CHUNK = "pushes.zarr/truth/c/1/0/0/0"
 ATTRIBUTES = "pushes.zarr/zarr.json"

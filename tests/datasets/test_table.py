@@ -22,7 +22,7 @@ from datasets.own_pushes import (
 from datasets.stores import assert_same_files, contents
 from sainet.datasets.batch import to_batch
 from sainet.datasets.recorded.table.importer import import_table
-from sainet.errors import BadInput, BadTable, MissingExtra, RunConflict
+from sainet.runs.errors import BadInput, BadTable, MissingExtra, RunConflict
 from support import require
 
 WITHIN = np.arange(1, 97) / 240  # s

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sainet.errors import BadInput
-from training.stores import info_of, made_up, write
+from learning.stores import info_of, made_up, write
+from sainet.runs.errors import BadInput
 
 
 @pytest.fixture

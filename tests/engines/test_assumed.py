@@ -11,8 +11,8 @@ from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties, calibrated
 from sainet.engines.base import roll_out
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.errors import UnknownName
-from sainet.scene import FrictionField
+from sainet.runs.errors import UnknownName
+from sainet.scenes.scene import FrictionField
 
 
 def scene_of(disks: int):

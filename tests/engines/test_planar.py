@@ -18,8 +18,9 @@ from sainet.engines.base import roll_out
 from sainet.engines.planar import engine as planar
 from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.pushes import PathControls
-from sainet.scene import FrictionField, pair_gaps, pusher_gaps
+from sainet.scenes.controls import PathControls
+from sainet.scenes.scene import FrictionField
+from sainet.scenes.shapes import pair_gaps, pusher_gaps
 
 STEPS = 50
 

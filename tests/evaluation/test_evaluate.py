@@ -8,17 +8,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from learning.stores import end_points_alone, info_of, made_up, quiet_store, write
 from models.samples import quick_dynamics
 from sainet.datasets.batch import to_batch
 from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties
-from sainet.errors import BadCheckpoint, BadInput, Diverged
 from sainet.evaluation.evaluate import evaluate
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.named import NamedDynamics
-from sainet.scene import State, Trajectory
-from training.stores import end_points_alone, info_of, made_up, quiet_store, write
+from sainet.runs.errors import BadCheckpoint, BadInput, Diverged
+from sainet.scenes.state import State, Trajectory
 
 PUSHES = 11
 LENGTHS = np.array([12, 5, 12, 8, 5, 12, 8, 8, 12, 5, 12])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.folds import fold_of_push, join_folds, make_folds
 from sainet.models.registry import load_dynamics
-from training.stores import end_points_alone, info_of, made_up, write
 
 REPEATS = np.random.default_rng(0).permutation(np.repeat(np.arange(9), 3))
 

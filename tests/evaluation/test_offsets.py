@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.offsets import EndOffsets, end_offsets
 from sainet.models.registry import load_dynamics
-from sainet.viz.engine_errors import draw_engine_errors
-from training.stores import end_points_alone, info_of, made_up, write
+from sainet.report.figures.engine_errors import draw_engine_errors
 
 
 def test_an_offset_ahead_is_along_and_one_to_the_left_is_across():

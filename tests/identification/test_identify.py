@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
@@ -15,7 +16,6 @@ from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.identified import FILE, beliefs_of, engine_of_beliefs, read_values
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.errors import BadInput, BadStore, RunConflict
 from sainet.identification.identify import identify, identify_into
 from sainet.identification.parameters import (
     doubt,
@@ -26,10 +26,10 @@ from sainet.identification.parameters import (
     with_values,
 )
 from sainet.identification.residuals import Scale, residuals, samples, slopes
+from sainet.learning.assumed import find_assumed_engine
 from sainet.models.registry import load_dynamics
-from sainet.pushes import move_controls, move_pusher
-from sainet.training.assumed import find_assumed_engine
-from training.stores import end_points_alone, info_of, made_up, write
+from sainet.runs.errors import BadInput, BadStore, RunConflict
+from sainet.scenes.controls import move_controls, move_pusher
 
 OFFSET = {"camera_x_mm": 0.8, "camera_y_mm": -0.5}
 TRUE = {"pusher_friction": 0.17, "pressure_radius_ratio": 0.5, **OFFSET}

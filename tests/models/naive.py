@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sainet.pushes import PathControls
+from sainet.scenes.controls import PathControls
 
 BOUND = 4.0  # standard deviations, that a feature is bent to
 

@@ -19,8 +19,9 @@ from sainet.models.dynamics import (
 )
 from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork, Scales
-from sainet.pushes import Controls
-from sainet.scene import TIME_STEP, Scene, State, Trajectory
+from sainet.scenes.controls import Controls
+from sainet.scenes.scene import TIME_STEP, Scene
+from sainet.scenes.state import State, Trajectory
 
 PUSHES = 4
 STEPS = 24

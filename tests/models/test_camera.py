@@ -12,8 +12,8 @@ from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.models.camera import OffsetCamera, with_camera
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
-from sainet.pushes import PathControls
-from sainet.scene import pack_motion
+from sainet.scenes.controls import PathControls
+from sainet.scenes.state import pack_motion
 
 STEPS = 40
 OFFSET = (2e-3, -1e-3)

@@ -9,14 +9,14 @@ import pytest
 
 from models.samples import network
 from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
-from sainet.errors import BadCheckpoint, UnknownName
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import LearnedDynamics, PhysicsDynamics, SimulatorAugmented
 from sainet.models.registry import PHYSICS, load_dynamics
-from sainet.runs import content_hash, write_json
-from sainet.scene import TIME_STEP
+from sainet.runs.documents import content_hash, write_json
+from sainet.runs.errors import BadCheckpoint, UnknownName
+from sainet.scenes.scene import TIME_STEP
 
 ASSUMED = {"mass": PAPER_MASS, "radius": PAPER_RADIUS, "friction": PAPER_FRICTION}
 

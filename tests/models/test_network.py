@@ -18,12 +18,7 @@ from models.samples import (
     quick_dynamics,
 )
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
-from sainet.models.features import (
-    FeatureSizes,
-    in_columns,
-    near_pairs,
-    still_features,
-)
+from sainet.models.features import FeatureSizes, in_columns, near_pairs, still_features
 from sainet.models.frame import (
     controls_to_frame,
     motion_from_frame,
@@ -32,8 +27,11 @@ from sainet.models.frame import (
 )
 from sainet.models.interaction import InteractionNetwork
 from sainet.models.widen import widen
-from sainet.pushes import Push, path_controls
-from sainet.scene import TIME_STEP, at_rest, pack_motion, pair_gaps
+from sainet.scenes.controls import path_controls
+from sainet.scenes.pushes import Push
+from sainet.scenes.scene import TIME_STEP
+from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.state import at_rest, pack_motion
 
 every_model = pytest.mark.parametrize("model", ["in", "sain"])
 every_kind = pytest.mark.parametrize("kind", ["robot", "direct-force"])

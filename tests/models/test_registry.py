@@ -7,11 +7,11 @@ import pytest
 
 from models.test_checkpoint import edit_card, write_network
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.errors import BadCheckpoint, MissingExtra
 from sainet.models.card import CARD
 from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.registry import PRETRAINED, SHIPPED, load_dynamics
-from sainet.scene import TIME_STEP
+from sainet.runs.errors import BadCheckpoint, MissingExtra
+from sainet.scenes.scene import TIME_STEP
 
 
 @pytest.fixture

@@ -3,8 +3,9 @@
 import jax.numpy as jnp
 import numpy as np
 
-from sainet.pushes import PushGrid
-from sainet.scene import Scene, at_rest
+from sainet.scenes.pushes import PushGrid
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import at_rest
 from sainet.tasks.push_to_goal import PushToGoal
 
 RADIUS = (0.054, 0.059)  # m

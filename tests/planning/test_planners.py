@@ -13,15 +13,15 @@ import pytest
 from models.samples import quick_dynamics
 from planning.scenes import FEW, RADIUS, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
-from sainet.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.greedy import GreedyPlanner
 from sainet.planning.levels import flatten
 from sainet.planning.outcomes import every_push, roll_pushes
 from sainet.planning.tree import TreePlanner
-from sainet.pushes import PushGrid
-from sainet.scene import at_rest
+from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
+from sainet.scenes.pushes import PushGrid
+from sainet.scenes.state import at_rest
 
 SCENE, STATE = scene(), touching()
 PHYSICS = PhysicsDynamics(make_engine("planar"))

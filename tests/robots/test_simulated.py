@@ -8,11 +8,11 @@ import pytest
 
 from planning.scenes import scene, touching
 from sainet.engines import make_engine
-from sainet.engines.config import NoiseConfig, at_level
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.outcomes import roll_pushes
-from sainet.pushes import PushGrid
 from sainet.robots.simulated import SimulatedRobot
+from sainet.scenes.pushes import PushGrid
+from sainet.worlds.noise_config import NoiseConfig, at_level
 
 QUIET = at_level(NoiseConfig(), "none")
 PUSH = jax.tree.map(lambda x: x[33], PushGrid().pushes())

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from planning.scenes import RADIUS, goal_ahead, scene, touching
-from sainet.errors import BadScene
-from sainet.geometry import rotate
-from sainet.scene import at_rest
+from sainet.runs.errors import BadScene
+from sainet.scenes.geometry import rotate
+from sainet.scenes.state import at_rest
 from sainet.tasks.goals import draw_goal
 
 

@@ -7,7 +7,7 @@ speed drifts; `docs/benchmarks.md` says what each of them means.
 from collections.abc import Callable
 from typing import Any
 
-from sainet.names import load_named
+from sainet.runs.names import load_named
 
 # Functions that take `runs`.
 CASES = {

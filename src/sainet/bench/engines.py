@@ -13,12 +13,13 @@ from sainet.bench.timing import check_runs, median_seconds
 from sainet.datasets.batch import to_controls, to_initial, to_scene
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.simulate import simulate_chunk, store_info
-from sainet.devices import over_devices
 from sainet.engines.base import AbstractEngine
 from sainet.engines.bullet.engine import BulletEngine
+from sainet.engines.devices import over_devices
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.pushes import Controls
-from sainet.scene import Scene, State, Trajectory
+from sainet.scenes.controls import Controls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
 
 BULLET_BATCH = 400  # scenes, the first of the batch: enough for every process
 BATCH = 72 * 72  # scenes: every sequence of two pushes of the grid

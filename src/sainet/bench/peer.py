@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from sainet.bench.problem import Problem
-from sainet.errors import SainetError
+from sainet.learning.batch import path_to_frame, to_target
 from sainet.models.bounded import GRADIENT_BOUND, GRADIENT_SIZES
 from sainet.models.features import drives, still_features
 from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
 from sainet.models.interaction import FEATURE_BOUND
-from sainet.scene import pack_motion
-from sainet.training.batch import path_to_frame, to_target
+from sainet.runs.errors import SainetError
+from sainet.scenes.state import pack_motion
 
 FOLDER = Path(__file__).resolve().parents[3] / "benchmarks"
 _SCRIPT = FOLDER / "torch_training.py"

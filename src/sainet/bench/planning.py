@@ -21,7 +21,7 @@ from sainet.models.registry import load_dynamics
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.base import Plan
 from sainet.planning.outcomes import batch_of, roll_pushes
-from sainet.pushes import PushGrid
+from sainet.scenes.pushes import PushGrid
 
 DECISIONS = 50
 _ROUNDS = 5  # in each of which decisions and pushes in Bullet take turns

@@ -7,12 +7,12 @@ import jax
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.simulate import simulate_chunk, store_info
+from sainet.learning.config import FitConfig
+from sainet.learning.loss import LossWeights
+from sainet.learning.statistics import feature_scales, loss_weights
+from sainet.learning.step import FitState, even_batch, first_state
 from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork
-from sainet.training.config import FitConfig
-from sainet.training.loss import LossWeights
-from sainet.training.statistics import feature_scales, loss_weights
-from sainet.training.step import FitState, even_batch, first_state
 
 
 class Problem(NamedTuple):

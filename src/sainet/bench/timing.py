@@ -7,7 +7,7 @@ from typing import Any
 
 import jax
 
-from sainet.errors import BadInput
+from sainet.runs.errors import BadInput
 
 
 def seconds(call: Callable[[], Any]) -> float:

@@ -30,7 +30,7 @@ class AddBystander:
         use_devices(None)
         from sainet.datasets.bystander import add_bystander
         from sainet.datasets.store import open_store
-        from sainet.errors import require_option
+        from sainet.runs.errors import require_option
 
         require_option(self.seed >= 0, "seed", "at least 0", self.seed)
         store = open_store(self.data)

@@ -9,8 +9,9 @@ from sainet.cli.devices import use_cache
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.control.config import ControlConfig
-from sainet.processes import worker_pool
-from sainet.runs import MANIFEST, read_json
+from sainet.runs.documents import read_json
+from sainet.runs.manifest import MANIFEST
+from sainet.runs.workers import worker_pool
 
 _DRAWN = 6  # episodes
 
@@ -35,7 +36,7 @@ class Control:
         use_cache()
         from sainet.control.summary import summarise
         from sainet.control.trials import prepare, run_trials
-        from sainet.viz.episodes import draw_episodes
+        from sainet.report.figures.episodes import draw_episodes
 
         config = self.config
         prepare(config)
@@ -63,8 +64,8 @@ class Control:
         return names | found | {"episodes": str(self.out / "episodes")}
 
     def _animate(self, records: list[dict[str, Any]]) -> None:
-        from sainet.viz.report import Report, write_report
-        from sainet.viz.video import best_format, frame_count, write_film
+        from sainet.report.figures.video import best_format, frame_count, write_film
+        from sainet.report.pages.page import Report, write_report
 
         first = records[0]
         film = self.out / f"episode-000{best_format()}"

@@ -8,8 +8,8 @@ from typing import Any
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.experiments.config import DemoConfig
-from sainet.processes import worker_pool
+from sainet.runs.workers import worker_pool
+from sainet.studies.config import DemoConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,9 +26,9 @@ class Demo:
     def run(self) -> dict[str, Any]:
         """Run the demo."""
         use_devices(self.devices)
-        from sainet.experiments.chain import Chain
-        from sainet.experiments.demo import run_demo
-        from sainet.viz.tables import print_table
+        from sainet.report.tables import print_table
+        from sainet.studies.chain import Chain
+        from sainet.studies.demo import run_demo
 
         with worker_pool(None) as pool:
             bar = partial(progress_bar, output=self.output)

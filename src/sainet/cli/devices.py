@@ -4,9 +4,10 @@ import os
 import platform
 from pathlib import Path
 
-from sainet.errors import BadInput
-from sainet.processes import core_count
-from sainet.runs import content_hash, processor
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import BadInput
+from sainet.runs.manifest import processor
+from sainet.runs.workers import core_count
 
 _WORTH_KEEPING = "0.5"  # s of compilation
 

@@ -22,7 +22,7 @@ from sainet.cli.output import finish
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.train import Train, going_on
-from sainet.errors import BadInput, SainetError
+from sainet.runs.errors import BadInput, SainetError
 
 
 def _command(words: Sequence[str]) -> Any:  # noqa: ANN401

@@ -39,7 +39,7 @@ class Evaluate:
         from sainet.datasets.store import open_store
         from sainet.evaluation.evaluate import evaluate
         from sainet.models.registry import load_dynamics
-        from sainet.viz.tables import print_table
+        from sainet.report.tables import print_table
 
         store = open_store(self.data)
         names = self.model or self._fitting(store)
@@ -60,13 +60,8 @@ class Evaluate:
 
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit the data; say why not."""
-        from sainet.errors import BadCheckpoint, MissingExtra
-        from sainet.models.registry import (
-            OF_PAPER,
-            OF_STROKES,
-            PHYSICS,
-            load_dynamics,
-        )
+        from sainet.models.registry import OF_PAPER, OF_STROKES, PHYSICS, load_dynamics
+        from sainet.runs.errors import BadCheckpoint, MissingExtra
 
         names, info = list(PHYSICS), store.info
         for name in OF_STROKES if info.bodies == 1 else OF_PAPER:

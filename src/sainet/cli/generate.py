@@ -7,7 +7,7 @@ from typing import Any
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
 from sainet.datasets.config import GenerateConfig
-from sainet.processes import worker_pool
+from sainet.runs.workers import worker_pool
 
 
 @dataclass(frozen=True, kw_only=True)

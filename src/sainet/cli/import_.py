@@ -8,7 +8,7 @@ from tyro.conf import Positional, arg
 
 from sainet.cli.devices import use_cache
 from sainet.cli.output import Output
-from sainet.errors import BadInput
+from sainet.runs.errors import BadInput
 
 if TYPE_CHECKING:
     from sainet.datasets.store import Store

@@ -19,9 +19,9 @@ class MakeReport:
 
     def run(self) -> dict[str, Any]:
         """Write the report, unless the command that made the folder wrote its own."""
-        from sainet.experiments.run_report import is_of_demo, page_of
-        from sainet.runs import write_bytes
-        from sainet.viz.report import REPORT
+        from sainet.report.pages.page import REPORT
+        from sainet.runs.documents import write_bytes
+        from sainet.studies.run_report import is_of_demo, page_of
 
         path = self.folder / REPORT
         if not is_of_demo(self.folder):

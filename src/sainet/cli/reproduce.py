@@ -14,12 +14,12 @@ from tyro.conf import Positional
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.errors import BadInput
-from sainet.experiments.config import Scale
-from sainet.processes import core_count, worker_pool
+from sainet.runs.errors import BadInput
+from sainet.runs.workers import core_count, worker_pool
+from sainet.studies.config import Scale
 
 if TYPE_CHECKING:
-    from sainet.experiments.chain import Chain
+    from sainet.studies.chain import Chain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,9 +50,9 @@ class Reproduce:
     def run(self) -> dict[str, Any]:
         """Run the experiments one after another."""
         use_devices(self.devices)
-        from sainet.experiments.chain import Chain
-        from sainet.viz.control_table import is_control, print_control
-        from sainet.viz.tables import print_table
+        from sainet.report.control_table import is_control, print_control
+        from sainet.report.tables import print_table
+        from sainet.studies.chain import Chain
 
         tables: dict[str, Any] = {}
         bar = partial(progress_bar, output=self.output)
@@ -87,7 +87,7 @@ class Reproduce:
     def _look_up(self, chain: "Chain") -> dict[str, Callable[..., dict[str, Any]]]:
         """Return what makes each table; what cannot be had is said before any runs."""
         from sainet.engines import make_engine
-        from sainet.experiments import load_experiment, needs_bullet, needs_recorded
+        from sainet.studies import load_experiment, needs_bullet, needs_recorded
 
         names = self.experiments or self._possible()
         found = {name: load_experiment(name) for name in names}
@@ -99,7 +99,7 @@ class Reproduce:
 
     def _possible(self) -> tuple[str, ...]:
         """Return what can be made here, and say what cannot."""
-        from sainet.experiments import EXPERIMENTS, needs_bullet, needs_recorded
+        from sainet.studies import EXPERIMENTS, needs_bullet, needs_recorded
 
         names = tuple(EXPERIMENTS)
         for lacks, lacking, needs in (

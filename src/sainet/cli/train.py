@@ -10,7 +10,7 @@ from tyro.conf import Positional
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.training.config import (
+from sainet.learning.config import (
     FINE_TUNING,
     FROM_ENGINE,
     RESIDUAL_TUNING,
@@ -48,8 +48,8 @@ class Train:
         """Train the network and draw its learning curve."""
         use_devices(self.devices)
         from sainet.datasets.store import open_store
-        from sainet.experiments.curves import draw_history
-        from sainet.training.fit import fit
+        from sainet.learning.fit import fit
+        from sainet.studies.curves import draw_history
 
         store = open_store(self.data)
         store = store if self.pushes is None else store.first(self.pushes)

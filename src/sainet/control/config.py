@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from sainet.engines.config import NoiseLevel
-from sainet.errors import require_option
+from sainet.runs.errors import require_option
+from sainet.worlds.noise_config import NoiseLevel
 
 Goals = Literal["easy", "hard"]
 Knowledge = Literal["true", "nominal"]

@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
-from sainet.errors import BadScene, Diverged
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Plan
-from sainet.pushes import Push
 from sainet.robots.base import AbstractRobot, Recording
-from sainet.scene import Scene, State
+from sainet.runs.errors import BadScene, Diverged
+from sainet.scenes.pushes import Push
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
 SOLVED = "solved"  # why most episodes end

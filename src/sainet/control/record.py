@@ -10,9 +10,9 @@ from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
 from sainet.control.record_check import flaw
 from sainet.control.trial import Trial
-from sainet.errors import BadInput
-from sainet.runs import read_json
-from sainet.scene import State
+from sainet.runs.documents import read_json
+from sainet.runs.errors import BadInput
+from sainet.scenes.state import State
 
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from sainet.runs import is_number
+from sainet.runs.documents import is_number
 
 Axis = int | str  # a length, or the name of one: those of one name are equal
 

@@ -9,11 +9,12 @@ import numpy as np
 from sainet.control.config import ControlConfig
 from sainet.engines import make_engine
 from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
-from sainet.engines.config import NoiseConfig, at_level
 from sainet.robots.simulated import SimulatedRobot
-from sainet.scene import Scene, State, at_rest
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, at_rest
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
+from sainet.worlds.noise_config import NoiseConfig, at_level
 
 # The disks that are pushed: unlike those that the assumed engine believes in.
 MASS = (0.9, 1.0)  # kg

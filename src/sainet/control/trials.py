@@ -19,9 +19,10 @@ from sainet.models.named import NamedDynamics
 from sainet.models.registry import load_dynamics
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
-from sainet.processes import each_done
-from sainet.runs import content_hash, open_run, write_json
-from sainet.scene import TIME_STEP
+from sainet.runs.documents import content_hash, write_json
+from sainet.runs.folders import open_run
+from sainet.runs.workers import each_done
+from sainet.scenes.scene import TIME_STEP
 
 SUMMARY = "episodes.json"
 FOLDER = "episodes"

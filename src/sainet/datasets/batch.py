@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from sainet.datasets.schema import StoreInfo, simulated_name
-from sainet.errors import Diverged
-from sainet.pushes import Controls, ForceControls, PathControls
-from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
+from sainet.runs.errors import Diverged
+from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
 
 class PushBatch(eqx.Module):

@@ -19,7 +19,7 @@ from sainet.datasets.assumed import simulate
 from sainet.datasets.derive import derive
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name, variables
 from sainet.datasets.store import Store
-from sainet.errors import BadStore
+from sainet.runs.errors import BadStore
 
 TOUCHING = 0.5  # share of the tries that are in touch with another disk
 FARTHEST = 0.02  # m, the widest gap to the disk beside which one lies

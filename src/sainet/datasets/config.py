@@ -6,8 +6,8 @@ from typing import Literal, get_args
 from tyro.conf import Positional
 
 from sainet.engines import ASSUMED_ENGINES, ENGINES
-from sainet.engines.config import NoiseConfig, NoiseLevel
-from sainet.errors import require_option
+from sainet.runs.errors import require_option
+from sainet.worlds.noise_config import NoiseConfig, NoiseLevel
 
 Setup = Literal["robot", "direct-force"]
 _RIGHT_ANGLE = 90  # degrees

@@ -8,7 +8,7 @@ from typing import Any
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import HASHES, write_store
-from sainet.runs import open_run
+from sainet.runs.folders import open_run
 
 
 def derive(

@@ -21,9 +21,9 @@ from sainet.datasets.writer import (
 )
 from sainet.engines import make_assumed_engine, make_engine
 from sainet.engines.bullet.engine import MOST_DISKS, BulletEngine
-from sainet.errors import require_option
-from sainet.processes import each_done
-from sainet.runs import open_run
+from sainet.runs.errors import require_option
+from sainet.runs.folders import open_run
+from sainet.runs.workers import each_done
 
 _log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.config import GenerateConfig, Range, bounds
-from sainet.errors import BadInput
+from sainet.runs.errors import BadInput
 
 _ARRANGEMENTS = 200  # of all disks of a scene
 _TRIES = 50  # for each disk of an arrangement

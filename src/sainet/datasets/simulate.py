@@ -10,31 +10,23 @@ from sainet.datasets.sampling import Draws, chunk_generator, draw
 from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.engines import make_assumed_engine, make_engine
 from sainet.engines.base import AbstractEngine, roll_out
-from sainet.engines.config import NoiseConfig, at_level
-from sainet.engines.noise import (
+from sainet.scenes.controls import (
+    Controls,
+    ForceControls,
+    PathControls,
+    force_controls,
+    path_controls,
+)
+from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.scene import TIME_STEP, FrictionField, Scene
+from sainet.scenes.state import State, at_rest, pack_motion
+from sainet.worlds.noise import (
     capture_error,
     force_error,
     friction_features,
     tracking_error,
 )
-from sainet.pushes import (
-    Controls,
-    ForceControls,
-    PathControls,
-    Push,
-    force_controls,
-    path_controls,
-    place_pusher,
-    push_direction,
-)
-from sainet.scene import (
-    TIME_STEP,
-    FrictionField,
-    Scene,
-    State,
-    at_rest,
-    pack_motion,
-)
+from sainet.worlds.noise_config import NoiseConfig, at_level
 
 _LENGTH_BUCKET = 40  # steps: pushes of nearly the same length share a compilation
 

@@ -11,8 +11,9 @@ from jaxtyping import Int
 
 from sainet.datasets.schema import FORMAT_VERSION, Kind, StoreInfo, sizes, variables
 from sainet.datasets.writer import ARRAYS, HASHES, chunk_files
-from sainet.errors import BadInput, BadStore
-from sainet.runs import content_hash, read_json, readable, remake
+from sainet.runs.documents import content_hash, read_json, readable
+from sainet.runs.errors import BadInput, BadStore
+from sainet.runs.folders import remake
 
 if TYPE_CHECKING:
     import xarray

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sainet.datasets.schema import FORMAT_VERSION, StoreInfo, sizes, variables
-from sainet.runs import content_hash, read_json, write_error, write_json
+from sainet.runs.documents import content_hash, read_json, write_error, write_json
 
 ARRAYS = "pushes.zarr"
 HASHES = "hashes.json"

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from sainet.names import load_named
+from sainet.runs.names import load_named
 
 if TYPE_CHECKING:
     from sainet.engines.assumed import AssumedProperties

@@ -8,8 +8,9 @@ from jaxtyping import Array, Float
 
 from sainet.engines import CALIBRATED
 from sainet.engines.base import AbstractEngine
-from sainet.pushes import Controls
-from sainet.scene import Scene, State, Trajectory
+from sainet.scenes.controls import Controls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
 
 PAPER_MASS = (0.896, 1.1)  # kg
 PAPER_RADIUS = (0.0525, 0.058)  # m

@@ -4,8 +4,9 @@ from abc import abstractmethod
 
 import equinox as eqx
 
-from sainet.pushes import Controls
-from sainet.scene import Scene, State, Trajectory
+from sainet.scenes.controls import Controls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
 
 
 class AbstractEngine(eqx.Module):

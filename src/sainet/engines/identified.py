@@ -6,8 +6,9 @@ from typing import Any
 
 from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.errors import BadInput
-from sainet.runs import CONFIG, is_number, read_json, remake
+from sainet.runs.documents import is_number, read_json
+from sainet.runs.errors import BadInput
+from sainet.runs.folders import CONFIG, remake
 
 FILE = "identified.json"
 IDENTIFIED = "identified"  # the name of such an engine on a network's card

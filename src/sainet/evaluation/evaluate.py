@@ -12,8 +12,7 @@ from jaxtyping import Array, Float
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import published_name, simulated_name, variables
 from sainet.datasets.store import Store
-from sainet.devices import over_devices
-from sainet.errors import BadInput, Diverged
+from sainet.engines.devices import over_devices
 from sainet.evaluation.intervals import Folds
 from sainet.evaluation.metrics import (
     REFERENCE_DISTANCE,
@@ -27,6 +26,7 @@ from sainet.evaluation.metrics import (
 from sainet.evaluation.rows import comparison_rows, error_rows
 from sainet.models.dynamics import AbstractDynamics
 from sainet.models.named import NamedDynamics
+from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200
 _BATCH = 256  # pushes that are predicted at a time: one compilation for each length

@@ -11,7 +11,6 @@ import numpy as np
 
 from sainet.datasets.store import Store
 from sainet.engines.identified import FILE, FRICTIONS, NAMES, read_values
-from sainet.errors import BadInput, BadStore
 from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     BOUNDS,
@@ -20,14 +19,11 @@ from sainet.identification.parameters import (
     names_for,
     starting_values,
 )
-from sainet.identification.residuals import (
-    Sample,
-    Scale,
-    pose_errors,
-    samples,
-)
+from sainet.identification.residuals import Sample, Scale, pose_errors, samples
 from sainet.identification.solve import Try, solve
-from sainet.runs import open_run, read_json, remake, write_json
+from sainet.runs.documents import read_json, write_json
+from sainet.runs.errors import BadInput, BadStore
+from sainet.runs.folders import open_run, remake
 
 _log = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from sainet.engines.identified import CAMERA, FRICTIONS, NAMES, RATIO, USUAL_RATIO
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.scene import Scene
+from sainet.scenes.scene import Scene
 
 BOUNDS = {
     **dict.fromkeys(FRICTIONS, (0.01, 2.0)),

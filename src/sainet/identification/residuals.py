@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.identification.parameters import camera_at, values_at, with_values
-from sainet.pushes import move_controls, move_pusher
+from sainet.scenes.controls import move_controls, move_pusher
 
 _LOOKS = 8  # observed poses of a push that are compared, evenly over it
 _BATCH = 256  # pushes at a time

@@ -5,11 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from sainet.identification.parameters import (
-    bounds_of,
-    from_coordinate,
-    to_coordinate,
-)
+from sainet.identification.parameters import bounds_of, from_coordinate, to_coordinate
 from sainet.identification.residuals import Sample, Scale, residuals, slopes
 
 Try = Callable[[float], None]  # told the error of all, root mean square

@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sainet.errors import BadCheckpoint
-from sainet.runs import write_bytes
+from sainet.runs.documents import write_bytes
+from sainet.runs.errors import BadCheckpoint
 
 
 def save_arrays(path: Path, tree: Any) -> bytes:  # noqa: ANN401

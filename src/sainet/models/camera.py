@@ -9,8 +9,9 @@ from jaxtyping import Array, Float
 
 from sainet.engines.identified import camera_offset
 from sainet.models.dynamics import AbstractDynamics, Purpose
-from sainet.pushes import Controls, move_controls, move_pusher
-from sainet.scene import Scene, State, Trajectory
+from sainet.scenes.controls import Controls, move_controls, move_pusher
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
 
 
 class OffsetCamera(AbstractDynamics):

@@ -4,9 +4,9 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from sainet.errors import BadCheckpoint
 from sainet.models.card_check import check_card
-from sainet.runs import FORMAT_VERSION, read_json
+from sainet.runs.documents import FORMAT_VERSION, read_json
+from sainet.runs.errors import BadCheckpoint
 
 CARD = "card.json"
 WEIGHTS = "network.safetensors"

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sainet.errors import BadCheckpoint
 from sainet.models.features import ACTION_SIZE, FEATURES
-from sainet.runs import is_number
+from sainet.runs.documents import is_number
+from sainet.runs.errors import BadCheckpoint
 
 _Check = tuple[Callable[[Any], bool], str]
 

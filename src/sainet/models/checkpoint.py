@@ -5,12 +5,12 @@ from pathlib import Path
 import equinox as eqx
 import jax
 
-from sainet.errors import BadCheckpoint
 from sainet.models.arrays import load_arrays
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
 from sainet.models.features import FeatureSizes
 from sainet.models.interaction import InteractionNetwork
-from sainet.runs import content_hash
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import BadCheckpoint
 
 
 def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:

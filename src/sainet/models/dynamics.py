@@ -19,8 +19,9 @@ from sainet.models.frame import (
     push_frame,
 )
 from sainet.models.interaction import InteractionNetwork, unroll
-from sainet.pushes import Controls, PathControls
-from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
 
 class Purpose(NamedTuple):

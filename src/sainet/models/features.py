@@ -17,8 +17,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sainet.models.frame import PushFrame
-from sainet.pushes import Controls, PathControls
-from sainet.scene import Scene
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.scene import Scene
 
 ACTION_SIZE = {"robot": 5, "direct-force": 4}
 FEATURES = ("paper", "place")

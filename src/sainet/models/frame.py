@@ -10,9 +10,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from sainet.geometry import direction, rotate
-from sainet.pushes import Controls, ForceControls, PathControls
-from sainet.scene import Scene, State, pusher_gaps
+from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.geometry import direction, rotate
+from sainet.scenes.scene import Scene
+from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.state import State
 
 
 class PushFrame(eqx.Module):

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from sainet.errors import BadCheckpoint
 from sainet.models.card import CARD, Card
 from sainet.models.dynamics import AbstractDynamics
+from sainet.runs.errors import BadCheckpoint
 
 _SAME_TIME = 1e-9  # s
 

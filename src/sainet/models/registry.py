@@ -12,7 +12,6 @@ from sainet.engines.identified import (
     is_identified,
     read_values,
 )
-from sainet.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.models.camera import with_camera
 from sainet.models.card import CARD, Card
 from sainet.models.checkpoint import load_network
@@ -24,6 +23,7 @@ from sainet.models.dynamics import (
 )
 from sainet.models.named import NamedDynamics
 from sainet.models.restarted import Restarted
+from sainet.runs.errors import BadCheckpoint, BadInput, UnknownName
 
 PHYSICS = {"physics": AssumedProperties, "physics-calibrated": calibrated}
 PRETRAINED = Path(__file__).parent / "pretrained"

@@ -4,10 +4,11 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from sainet.errors import BadInput
 from sainet.models.dynamics import AbstractDynamics, Purpose
-from sainet.pushes import Controls, PathControls
-from sainet.scene import Scene, State, Trajectory
+from sainet.runs.errors import BadInput
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
 
 
 class Restarted(AbstractDynamics):

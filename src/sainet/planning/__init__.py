@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from sainet.errors import BadInput
-from sainet.names import load_named
+from sainet.runs.errors import BadInput
+from sainet.runs.names import load_named
 
 if TYPE_CHECKING:
     from sainet.planning.base import AbstractPlanner

@@ -12,8 +12,9 @@ from jaxtyping import Array, Float
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.checks import check_model, check_observation, doubts
 from sainet.planning.outcomes import batch_of, roll_pushes
-from sainet.pushes import Push, PushGrid
-from sainet.scene import Scene, State, at_rest
+from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, at_rest
 from sainet.tasks.base import AbstractTask
 
 

@@ -5,10 +5,13 @@ from collections.abc import Iterator, Sequence
 import equinox as eqx
 import numpy as np
 
-from sainet.errors import BadCheckpoint, BadScene
 from sainet.models.dynamics import AbstractDynamics
-from sainet.pushes import PathControls, Push, PushGrid
-from sainet.scene import Scene, State, check_state, pair_gaps
+from sainet.runs.errors import BadCheckpoint, BadScene
+from sainet.scenes.controls import PathControls
+from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.scene import Scene
+from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.state import State, check_state
 
 _DEEPEST_OVERLAP = 5e-3  # m, of disks that were seen; more is no noise of a camera
 _APART = 5e-3  # m: networks are trained on disks that touch

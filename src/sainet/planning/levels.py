@@ -7,10 +7,10 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.errors import Diverged
 from sainet.planning.base import Found
 from sainet.planning.outcomes import Outcomes
-from sainet.scene import State
+from sainet.runs.errors import Diverged
+from sainet.scenes.state import State
 
 Expand = Callable[[State], Outcomes]
 

@@ -7,10 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from sainet.devices import over_devices
+from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
-from sainet.pushes import Push, path_controls, place_pusher, push_direction
-from sainet.scene import Scene, State, Trajectory, at_rest, pusher_gaps
+from sainet.scenes.controls import path_controls
+from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.scene import Scene
+from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.state import State, Trajectory, at_rest
 from sainet.tasks.base import AbstractTask
 
 SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests

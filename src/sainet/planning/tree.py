@@ -10,8 +10,9 @@ from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Found
 from sainet.planning.levels import Expand, Level, choose, flatten
 from sainet.planning.outcomes import Outcomes, every_push
-from sainet.pushes import PushGrid
-from sainet.scene import Scene, State
+from sainet.scenes.pushes import PushGrid
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
 _NEAR = 0.010  # m, from where on a third push is looked at (the paper's 10 mm)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sainet.pushes import Push
-from sainet.scene import State
+from sainet.scenes.pushes import Push
+from sainet.scenes.state import State
 
 
 @dataclass(frozen=True)

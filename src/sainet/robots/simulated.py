@@ -8,17 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.engines.base import AbstractEngine, roll_out
-from sainet.engines.config import NoiseConfig
-from sainet.engines.noise import capture_error, friction_features, tracking_error
-from sainet.pushes import (
-    PathControls,
-    Push,
-    path_controls,
-    place_pusher,
-    push_direction,
-)
 from sainet.robots.base import AbstractRobot, Recording
-from sainet.scene import FrictionField, Scene, State, at_rest, pusher_gaps
+from sainet.scenes.controls import PathControls, path_controls
+from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.scene import FrictionField, Scene
+from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.state import State, at_rest
+from sainet.worlds.noise import capture_error, friction_features, tracking_error
+from sainet.worlds.noise_config import NoiseConfig
 
 PUSH_STEPS = 200  # 48 of motion; then the pusher holds while the disks come to rest
 

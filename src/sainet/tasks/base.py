@@ -5,7 +5,8 @@ from abc import abstractmethod
 import equinox as eqx
 from jaxtyping import Array, Bool, Float
 
-from sainet.scene import Scene, State
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
 
 
 class AbstractTask(eqx.Module):

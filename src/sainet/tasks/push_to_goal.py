@@ -4,9 +4,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from sainet.errors import BadScene
-from sainet.geometry import norm
-from sainet.scene import Scene, State
+from sainet.runs.errors import BadScene
+from sainet.scenes.geometry import norm
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
 TOLERANCE_RADII = 0.1

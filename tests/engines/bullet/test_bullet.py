@@ -19,8 +19,8 @@ from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.engines.bullet import pool, world
-from sainet.errors import BadScene, MissingExtra, SainetError
-from sainet.scene import GRAVITY, FrictionField
+from sainet.runs.errors import BadScene, MissingExtra, SainetError
+from sainet.scenes.scene import GRAVITY, FrictionField
 from support import require
 
 

@@ -12,7 +12,7 @@ from sainet.datasets.assumed import simulate
 from sainet.datasets.recorded.push import RecordedPush
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk
-from sainet.scene import TIME_STEP
+from sainet.scenes.scene import TIME_STEP
 
 STORED_ENGINES = ("planar", "planar-calibrated")  # whose s-bar imports keep
 _CHUNK_SIZE = 250  # pushes

@@ -7,8 +7,8 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from sainet.errors import BadTable
-from sainet.runs import readable
+from sainet.runs.documents import readable
+from sainet.runs.errors import BadTable
 
 LARGEST_FILE = 16 << 20  # bytes
 LARGEST_SUM = 4 << 30  # bytes

@@ -12,9 +12,10 @@ from typing import Any
 
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import HASHES
-from sainet.errors import BadInput
-from sainet.locks import lock_folder
-from sainet.runs import CONFIG, open_run, readable, write_error
+from sainet.runs.documents import readable, write_error
+from sainet.runs.errors import BadInput
+from sainet.runs.folders import CONFIG, open_run
+from sainet.runs.locks import lock_folder
 
 _log = logging.getLogger(__name__)
 

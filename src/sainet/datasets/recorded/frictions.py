@@ -1,6 +1,6 @@
 """The frictions that an engine is told of recorded pushes."""
 
-from sainet.errors import BadInput
+from sainet.runs.errors import BadInput
 
 CONTACT_FRICTION = 0.25
 TABLE_FRICTION = 0.15  # the paper's; a quasi-static path hardly depends on it

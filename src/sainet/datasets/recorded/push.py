@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from sainet.datasets.recorded.tracks import Track
-from sainet.scene import TIME_STEP
+from sainet.scenes.scene import TIME_STEP
 
 LONGEST = 60.0  # s
 SMOOTHING = 25  # samples of a window of the Savitzky-Golay filter: 0.1 s

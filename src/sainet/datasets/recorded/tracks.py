@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sainet.scene import TIME_STEP
+from sainet.scenes.scene import TIME_STEP
 
 LONGEST_GAP = 0.1  # s: what lies between samples further apart is not known
 ALLOWED_MOVE = 0.005  # m, between samples of 250 Hz: 1.25 m/s

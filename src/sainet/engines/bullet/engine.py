@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Array
 
 from sainet.engines.base import AbstractEngine
-from sainet.errors import BadScene, MissingExtra
-from sainet.pushes import Controls, ForceControls, PathControls
-from sainet.scene import Scene, State, Trajectory, pack_motion, unpack_motion
+from sainet.runs.errors import BadScene, MissingExtra
+from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
 if TYPE_CHECKING:
     from sainet.engines.bullet.world import Job

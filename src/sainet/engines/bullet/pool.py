@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from sainet.engines.bullet.world import Job, Moved, roll_jobs
-from sainet.processes import core_count, spawned_pool, worker_lost
+from sainet.runs.workers import core_count, spawned_pool, worker_lost
 
 _FEW = 8  # pushes for which asking other processes does not pay
 _SHARES = 4  # of the work that each process gets: their speeds differ

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from sainet.scene import GRAVITY, Scene, State
+from sainet.scenes.scene import GRAVITY, Scene
+from sainet.scenes.state import State
 
 Scalars = tuple[Array, ...]  # one array of the batch's shape for each body
 

@@ -16,8 +16,9 @@ from sainet.engines.planar.bodies import (
 from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
 from sainet.engines.planar.solver import Step, solve_all_pairs
 from sainet.engines.planar.table import Twist
-from sainet.pushes import Controls, ForceControls, PathControls
-from sainet.scene import Scene, State, Trajectory
+from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
 
 
 class PlanarEngine(AbstractEngine):

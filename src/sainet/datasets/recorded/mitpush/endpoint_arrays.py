@@ -8,7 +8,7 @@ from sainet.datasets.recorded.arrays import numbered
 from sainet.datasets.recorded.mitpush.disk import MASS, PUSHER_RADIUS, RADIUS
 from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog
 from sainet.datasets.schema import StoreInfo, published_name, simulated_name
-from sainet.scene import TIME_STEP
+from sainet.scenes.scene import TIME_STEP
 
 STROKE = 0.050  # m: recorded ones are within 0.7 mm of it
 ASSUMED_ENGINE = "planar"

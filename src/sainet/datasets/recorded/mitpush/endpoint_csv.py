@@ -6,7 +6,7 @@ import logging
 from collections.abc import Iterator
 from pathlib import Path
 
-from sainet.errors import BadTable
+from sainet.runs.errors import BadTable
 
 _log = logging.getLogger(__name__)
 

@@ -10,8 +10,8 @@ from sainet.datasets.recorded.files import read_bytes
 from sainet.datasets.recorded.mitpush.disk import SPEED_RANGE
 from sainet.datasets.recorded.mitpush.endpoint_csv import PLAN, Row, read_csv
 from sainet.datasets.recorded.mitpush.endpoint_mat import read_mat
-from sainet.errors import BadTable
-from sainet.runs import readable
+from sainet.runs.documents import readable
+from sainet.runs.errors import BadTable
 
 TABLE = "ellip1_endpoints.csv"
 ORIGIN = (

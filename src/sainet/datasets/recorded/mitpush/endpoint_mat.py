@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from sainet.datasets.recorded.mitpush.endpoint_csv import Row
-from sainet.errors import BadTable
+from sainet.runs.errors import BadTable
 
 # Each field of a record, and the columns of the table that say the same.
 FIELDS = {

@@ -27,8 +27,8 @@ from sainet.datasets.recorded.mitpush.endpoint_log import (
 )
 from sainet.datasets.store import Store
 from sainet.datasets.writer import write_store
-from sainet.errors import BadTable
-from sainet.runs import content_hash
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import BadTable
 
 CONTACT_FRICTION_ORIGIN = (
     "default: mu in a published evaluation log of this robot (plywood, rect1), and the "

@@ -18,7 +18,7 @@ from sainet.datasets.recorded.tracks import (
     without_repeats,
     without_symmetry_jumps,
 )
-from sainet.errors import MissingExtra
+from sainet.runs.errors import MissingExtra
 
 OBJECT, TIP = "object_pose", "tip_pose"
 _COLUMNS = 4  # t, x, y, yaw

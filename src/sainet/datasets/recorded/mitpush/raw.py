@@ -23,8 +23,8 @@ from sainet.datasets.recorded.mitpush.motion import read_motion
 from sainet.datasets.recorded.mitpush.names import MotionFile, choose
 from sainet.datasets.recorded.push import RecordedPush, Unusable
 from sainet.datasets.store import Store
-from sainet.errors import BadTable
-from sainet.runs import content_hash, to_json
+from sainet.runs.documents import content_hash, to_json
+from sainet.runs.errors import BadTable
 
 _log = logging.getLogger(__name__)
 

@@ -11,7 +11,7 @@ from sainet.datasets.recorded.frictions import (
     TABLE_FRICTION,
     check_frictions,
 )
-from sainet.errors import BadTable
+from sainet.runs.errors import BadTable
 
 EXAMPLE = "[bodies.NAME] with mass = 0.9 and radius = 0.05, and [pusher] radius = 0.005"
 _SECTIONS = {"bodies", "pusher", "friction"}

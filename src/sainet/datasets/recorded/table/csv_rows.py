@@ -16,7 +16,7 @@ from sainet.datasets.recorded.table.rows import (
     TableRows,
     check_header,
 )
-from sainet.errors import BadTable
+from sainet.runs.errors import BadTable
 
 
 def read_csv(path: Path, data: bytes) -> TableRows:

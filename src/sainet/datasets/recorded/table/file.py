@@ -5,8 +5,8 @@ from pathlib import Path
 from sainet.datasets.recorded.files import read_bytes
 from sainet.datasets.recorded.table.csv_rows import read_csv
 from sainet.datasets.recorded.table.rows import TableRows
-from sainet.errors import BadTable
-from sainet.runs import readable
+from sainet.runs.documents import readable
+from sainet.runs.errors import BadTable
 
 LARGEST = 1 << 30  # bytes
 

@@ -21,8 +21,8 @@ from sainet.datasets.recorded.table.file import read_rows, read_table_bytes
 from sainet.datasets.recorded.table.pushes import to_pushes
 from sainet.datasets.recorded.table.rows import TableRows
 from sainet.datasets.store import Store
-from sainet.errors import BadTable
-from sainet.runs import content_hash
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import BadTable
 
 _log = logging.getLogger(__name__)
 

@@ -14,7 +14,7 @@ from sainet.datasets.recorded.table.rows import (
     TableRows,
     check_header,
 )
-from sainet.errors import BadTable, MissingExtra
+from sainet.runs.errors import BadTable, MissingExtra
 
 
 def read_parquet(path: Path, data: bytes) -> TableRows:

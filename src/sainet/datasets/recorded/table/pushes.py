@@ -6,12 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.datasets.recorded.push import (
-    LONGEST,
-    RecordedPush,
-    Unusable,
-    resample,
-)
+from sainet.datasets.recorded.push import LONGEST, RecordedPush, Unusable, resample
 from sainet.datasets.recorded.table.body_properties import BodyProperties
 from sainet.datasets.recorded.table.rows import GROUP, NUMBERS, TableRows
 from sainet.datasets.recorded.tracks import (

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.errors import BadTable
+from sainet.runs.errors import BadTable
 
 TEXT = ("push", "body")
 GROUP = "group"  # may be missing

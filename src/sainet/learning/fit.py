@@ -1,0 +1,247 @@
+"""The training loop: resumes after any interruption to the same weights."""
+
+import logging
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array
+
+from sainet.datasets.batch import PushBatch
+from sainet.datasets.reader import BatchReader
+from sainet.datasets.store import Store
+from sainet.learning.assumed import find_assumed_engine
+from sainet.learning.best import Best
+from sainet.learning.config import FitConfig, ModelKind
+from sainet.learning.log import append_log, read_log, rewind_log
+from sainet.learning.loss import LossWeights
+from sainet.learning.step import (
+    FitState,
+    data_loss,
+    even_batch,
+    make_step,
+    trained_layers,
+)
+from sainet.learning.task import FROM_ENGINE, Start, Task, begin, check_data, settings
+from sainet.models.arrays import load_arrays, save_arrays
+from sainet.models.card import CARD, WEIGHTS, Card
+from sainet.models.checkpoint import load_network
+from sainet.models.interaction import InteractionNetwork
+from sainet.models.registry import SHIPPED, network_folder
+from sainet.runs.documents import content_hash, read_json, write_json
+from sainet.runs.errors import Diverged, UnknownName
+from sainet.runs.folders import RunFolder, open_run
+from sainet.runs.manifest import MANIFEST, manifest
+
+STATE = "state.safetensors"
+Validate = Callable[[InteractionNetwork], float]
+Step = Callable[[FitState, PushBatch], tuple[FitState, Array]]
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A trained network's folder and what was logged on the way."""
+
+    folder: Path
+    history: list[dict[str, Any]]
+
+
+def fit(
+    model: ModelKind,
+    store: Store,
+    config: FitConfig,
+    out: Path,
+    *,
+    assumed_engine: str = "planar",
+    start_from: str | None = None,
+    on_step: Callable[[int, float], None] = lambda iteration, loss: None,
+) -> FitResult:
+    """Train a network, or go on with an interrupted training.
+
+    Args:
+        model: `in` or `sain`.
+        store: training data.
+        config: of the training.
+        out: the run folder.
+        assumed_engine: whose prediction SAIN sees: by its name in the store, or the
+            folder of an identified engine, which then predicts as it is needed.
+        start_from: the network to go on from, by its name or folder; None draws one.
+            `engine` draws one that adds to the assumed engine, and adds nothing yet.
+        on_step: told the finished iterations and the loss that was last logged.
+
+    Raises:
+        RunConflict: the folder holds something else.
+        BadStore: the data lack what the network needs.
+        BadCheckpoint: training cannot go on from that network.
+        Diverged: the loss left the finite numbers for good.
+    """
+    assumed = find_assumed_engine(assumed_engine)
+    from_engine = start_from == FROM_ENGINE
+    start = None if from_engine else _start(start_from)
+    config = config.for_pushes(store.info.pushes)
+    task = Task(model, store, config, assumed, start, from_engine)
+    check_data(task)
+    devices = jax.device_count()
+    folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
+    if folder.is_finished:
+        _log.info("%s is finished already", out)
+        return FitResult(out, read_log(out))
+    _warn_of_other_machine(folder, devices)
+    state, weights = begin(task)
+    goes_on = task.start is not None or task.from_engine
+    drawn_to = trained_layers(state.network) if goes_on else None
+    validate = _make_validation(task, weights)
+    best = Best.first(state.network, validate(state.network)) if validate else None
+    if (out / STATE).is_file():
+        state, best = load_arrays(out / STATE, (state, best))
+    history = rewind_log(out, int(state.iteration))
+    # Where the step leaves it: otherwise its first call compiles a second time.
+    state = jax.device_put(state, jax.devices()[0])
+    progress = Progress(state, best, history)
+    step = make_step(config, weights, drawn_to)
+    _iterate(task, progress, step, validate, out=out, on_step=on_step)
+    _finish(task, progress, folder)
+    return FitResult(out, history)
+
+
+def _start(name: str | None) -> Start | None:
+    if name is None:
+        return None
+    if name not in SHIPPED and not Path(name).exists():
+        known = ", ".join((FROM_ENGINE, *SHIPPED))
+        raise UnknownName(
+            f"--start-from is {name!r}; it must be {known}, or the folder of a trained "
+            "network."
+        )
+    folder = network_folder(name)
+    return Start(*load_network(folder), folder)
+
+
+def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
+    before, now = read_json(folder.path / MANIFEST), manifest(devices)
+    known = before.get("versions")
+    if isinstance(known, dict):  # manifests once named fewer packages
+        now["versions"] = {k: v for k, v in now["versions"].items() if k in known}
+    for name in ("versions", "processor", "devices"):
+        if before.get(name) != now[name]:
+            warnings.warn(
+                f"{folder.path}: {name} was {before.get(name)} when training began and "
+                f"is {now[name]} now; the weights will differ in their last bits.",
+                stacklevel=3,
+            )
+
+
+@dataclass
+class Progress:
+    """What changes while training: enough to go on from."""
+
+    state: FitState
+    best: Best | None  # where pushes are kept for validation
+    history: list[dict[str, Any]]
+
+    @property
+    def network(self) -> InteractionNetwork:
+        """The network that training would end with now."""
+        network = self.state.result
+        return network if self.best is None else self.best.put_into(network)
+
+
+def _iterate(
+    task: Task,
+    progress: Progress,
+    step: Step,
+    validate: Validate | None,
+    *,
+    out: Path,
+    on_step: Callable[[int, float], None],
+) -> None:
+    config, history = task.config, progress.history
+    size, seed = config.batch_size, config.seed
+    reader = BatchReader(task.training, task.names, size, seed, complete=task.complete)
+    try:
+        for iteration in range(
+            int(progress.state.iteration) + 1, config.iterations + 1
+        ):
+            arrays = reader.batch(iteration - 1)
+            batch = even_batch(task.to_training_batch(*arrays, iteration))
+            progress.state, loss = step(progress.state, batch)
+            last = iteration == config.iterations
+            if iteration % config.log_every == 0 or last:
+                _log_line(progress, iteration, float(loss), validate, out)
+            if iteration % config.checkpoint_every == 0 or last:
+                save_arrays(out / STATE, (progress.state, progress.best))
+            on_step(iteration, history[-1]["loss"] if history else float("nan"))
+            if progress.best and progress.best.is_stale(iteration, config.patience):
+                break
+    finally:
+        reader.close()
+
+
+def _log_line(
+    progress: Progress,
+    iteration: int,
+    loss: float,
+    validate: Validate | None,
+    out: Path,
+) -> None:
+    line = {"iteration": iteration, "loss": loss}
+    if validate is not None and progress.best is not None:
+        network = progress.state.result
+        line["validation_loss"] = validate(network)
+        progress.best = progress.best.or_better(
+            network, line["validation_loss"], iteration
+        )
+    _check_finite(line, out)
+    append_log(out, line)
+    progress.history.append(line)
+
+
+def _check_finite(line: dict[str, Any], out: Path) -> None:
+    if not np.isfinite(line["loss"]):
+        raise Diverged(
+            f"{out}: the loss is {line['loss']} at iteration {line['iteration']}; "
+            "lower --learning-rate or --clip-norm."
+        )
+
+
+def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
+    """Return what measures the loss on the pushes that are kept for validation."""
+    if task.validation is None:
+        return None
+    arrays = task.validation.read(slice(None), task.names)
+    batch = task.to_batch(arrays, task.store.info.steps)
+    known = int(batch.is_observed.sum())
+    # Arguments all: XLA would spend seconds on folding what a function holds.
+    loss = jax.jit(data_loss)
+    return lambda network: float(loss(network, batch, weights)) / known
+
+
+def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
+    info, sain, history = task.store.info, task.model == "sain", progress.history
+    data = save_arrays(folder.path / WEIGHTS, progress.network)
+    card = Card(
+        model=task.model,
+        kind=info.kind,
+        time_step=info.time_step,
+        inner_engine=task.assumed.name if sain else None,
+        truth_engine=info.engine,
+        assumed=task.assumed.beliefs if sain else None,
+        data=task.store.content,
+        data_seed=info.seed,
+        weights=content_hash(data),
+        config=asdict(task.config),
+        manifest=read_json(folder.path / MANIFEST),
+        features=task.config.features,
+        started_from=task.start.card.weights if task.start else None,
+        earlier_seeds=task.start.card.data_seeds if task.start else [],
+        recurrent=task.config.recurrent,
+        residual=progress.network.residual,
+        final_loss=history[-1]["loss"] if history else None,
+    )
+    write_json(folder.path / CARD, card.to_dict())
+    (folder.path / STATE).unlink(missing_ok=True)

@@ -1,0 +1,50 @@
+"""The log of a training: JSON lines, the same after a resume."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from sainet.runs.documents import is_number, write_bytes
+from sainet.runs.errors import BadCheckpoint
+
+LOG = "log.jsonl"
+
+
+def read_log(folder: Path) -> list[dict[str, Any]]:
+    """Return the lines of a log; a line that was cut by a crash is left out.
+
+    Raises:
+        BadCheckpoint: a whole line is none of ours.
+    """
+    path = folder / LOG
+    if not path.is_file():
+        return []
+    *lines, _ = path.read_bytes().split(b"\n")
+    return [_parsed(path, number, line) for number, line in enumerate(lines, 1)]
+
+
+def _parsed(path: Path, number: int, line: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(line)
+        if all(is_number(found[name]) for name in ("iteration", "loss")):
+            return found
+    except (ValueError, TypeError, LookupError, RecursionError):
+        pass
+    raise BadCheckpoint(
+        f"{path}: line {number} is damaged; it must hold iteration and loss. Delete "
+        "that line (the network does not depend on it) and run the same command again."
+    )
+
+
+def rewind_log(folder: Path, iteration: int) -> list[dict[str, Any]]:
+    """Forget what was logged after the checkpoint that training goes on from."""
+    kept = [line for line in read_log(folder) if line["iteration"] <= iteration]
+    text = "".join(json.dumps(line) + "\n" for line in kept)
+    write_bytes(folder / LOG, text.encode())
+    return kept
+
+
+def append_log(folder: Path, line: dict[str, Any]) -> None:
+    """Add a line."""
+    with (folder / LOG).open("a", encoding="utf-8") as file:
+        file.write(json.dumps(line) + "\n")

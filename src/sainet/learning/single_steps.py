@@ -1,0 +1,64 @@
+"""Pushes cut into single steps: what the non-recurrent form is trained on."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from sainet.datasets.batch import PushBatch
+from sainet.engines.base import AbstractEngine
+from sainet.scenes.controls import PathControls
+from sainet.scenes.state import State, pack_motion, unpack_motion
+
+
+@eqx.filter_jit
+def to_single_steps(batch: PushBatch, engine: AbstractEngine | None) -> PushBatch:
+    """Return every step of every push as a push of its own, of one step.
+
+    It starts from the true state, and the engine restarts there too (figure 2c of the
+    paper); its target is the true next state, so that no noise of the capture stands
+    between the two.
+
+    Args:
+        batch: pushes whose pusher follows a path, the truth known at every step.
+        engine: predicts s-bar of each step; None for a network alone.
+    """
+    steps = batch.truth.shape[1]
+    scene = jax.tree.map(lambda x: jnp.repeat(x, steps, axis=0), batch.scene)
+    initial, controls = _states_before(batch), jax.tree.map(_each, batch.controls)
+    simulated = None
+    if engine is not None:
+        states = engine.rollout(scene, initial, controls).states
+        simulated = pack_motion(states)
+    truth = _each(batch.truth)
+    return PushBatch(
+        scene=scene,
+        initial=initial,
+        controls=controls,
+        truth=truth,
+        measured=truth[..., :3],
+        pose_observed=_each(batch.pose_observed),
+        rate_observed=_each(batch.rate_observed),
+        simulated=simulated,
+    )
+
+
+def _states_before(batch: PushBatch) -> State:
+    """Return the true state before each step; the pusher is where it should be."""
+    initial, controls = batch.initial, batch.controls
+    assert isinstance(controls, PathControls)
+    motion = _shifted(pack_motion(initial), batch.truth)
+    pusher = _shifted(initial.pusher_position, controls.position)
+    velocity = _shifted(initial.pusher_velocity, controls.velocity)
+    return unpack_motion(motion, pusher, velocity)
+
+
+def _shifted(start: Array, after: Array) -> Array:
+    """Return what was before each step, from what was after it; one row a step."""
+    before = jnp.concatenate([start[:, None], after[:, :-1]], axis=1)
+    return before.reshape(-1, *before.shape[2:])
+
+
+def _each(x: Array) -> Array:
+    """Turn ``[push, time, ...]`` into ``[push * time, 1, ...]``."""
+    return x.reshape(-1, 1, *x.shape[2:])

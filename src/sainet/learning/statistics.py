@@ -1,0 +1,141 @@
+"""Scales of features, outputs and loss terms, from the training data."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from sainet.datasets.batch import PushBatch
+from sainet.learning.batch import path_to_frame
+from sainet.learning.config import FitConfig
+from sainet.learning.loss import LossWeights
+from sainet.models.features import (
+    FeatureSizes,
+    body_features,
+    drives,
+    in_columns,
+    pair_features,
+    still_features,
+)
+from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
+from sainet.models.interaction import Scales
+from sainet.models.relaxation import gains
+from sainet.scenes.state import pack_motion
+
+# A deviation below this, or this share of the mean, is rounding: nothing varies.
+_CONSTANT, _CONSTANT_SHARE = 1e-9, 1e-4
+_STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is rounding
+
+
+@eqx.filter_jit
+def feature_scales(
+    batch: PushBatch, sizes: FeatureSizes, *, residual: bool = False
+) -> Scales:
+    """Return means and deviations of what a network sees along the true paths.
+
+    What it says is measured by how the bodies accelerate, or, if it is added to the
+    engine's motion, by what corrects the engine.
+    """
+    frame = push_frame(batch.scene, batch.initial)
+    motion = path_to_frame(_known_motion(batch), frame)
+    start = motion_to_frame(pack_motion(batch.initial), frame)
+    before = jnp.concatenate([start[None], motion[:-1]])
+    simulated = None
+    if sizes.augmented and batch.simulated is not None:
+        simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
+    drive = drives(controls_to_frame(batch.controls, frame), start, simulated)
+    drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
+    still = in_columns(still_features(batch.scene, frame, sizes))
+    columns = jax.vmap(in_columns)((before, drive))
+    over_time = jax.vmap(lambda now: body_features(now[0], still, now[1]), out_axes=1)
+    body_mean, body_deviation = _spread(over_time(columns))
+    if batch.scene.body_count > 1:
+        pairs = jax.vmap(lambda now: pair_features(now[0], still, now[1]), out_axes=1)
+        pair_mean, pair_deviation = _spread(pairs(columns))
+    else:
+        pair_mean, pair_deviation = jnp.zeros(sizes.pair), jnp.ones(sizes.pair)
+    change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
+    size = jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
+    size = _correction(batch) if residual else size
+    return Scales(
+        pair_mean=pair_mean,
+        pair_deviation=pair_deviation,
+        body_mean=body_mean,
+        body_deviation=body_deviation,
+        # x and y share a scale: no direction of the frame counts more.
+        acceleration=jnp.array([size[:2].mean(), size[:2].mean(), size[2]]),
+    )
+
+
+def _spread(features: Array) -> tuple[Array, Array]:
+    rows = features.reshape(features.shape[0], -1)
+    mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
+    # A feature that never varies, a fixed mass say, must not be divided by rounding.
+    varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
+    return mean, jnp.where(varies, deviation, 1.0)
+
+
+@eqx.filter_jit
+def loss_weights(batch: PushBatch, config: FitConfig) -> LossWeights:
+    """Return the settings over mean squares in the data.
+
+    Those of the motion, or of the errors that s-bar makes where the truth was observed:
+    errors are what training is to make small, and where one end of a push alone is
+    known, position and rotation would else count very unequally.
+    """
+    pose, rate = _motion(batch) if config.terms == "motion" else _errors(batch)
+    place = jnp.nanmean(jnp.sum(pose[..., 0:2] ** 2, axis=-1))
+    velocity = jnp.nanmean(jnp.sum(rate[..., 0:2] ** 2, axis=-1))
+    return LossWeights(
+        position=config.weight_position / _nonzero(place),
+        rotation=config.weight_rotation / _nonzero(jnp.nanmean(pose[..., 2] ** 2)),
+        velocity=config.weight_velocity / _nonzero(velocity),
+        spin=config.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
+        linear_from=config.linear_from,
+    )
+
+
+def _motion(batch: PushBatch) -> tuple[Array, Array]:
+    """Return how far things have moved and how fast they do."""
+    motion = _known_motion(batch)
+    start = pack_motion(batch.initial)[:, None]
+    return motion[..., 0:3] - start[..., 0:3], motion[..., 3:6]
+
+
+def _errors(batch: PushBatch) -> tuple[Array, Array]:
+    """Return how wrong s-bar is, NaN where the truth was not observed."""
+    assert batch.simulated is not None
+    error = batch.truth - batch.simulated
+
+    def where(observed: Array, part: Array) -> Array:
+        return jnp.where(observed[:, :, None, None], part, jnp.nan)
+
+    return (
+        where(batch.pose_observed, error[..., 0:3]),
+        where(batch.rate_observed, error[..., 3:6]),
+    )
+
+
+def _correction(batch: PushBatch) -> Array:
+    """Return the acceleration that, held, makes an error as large as s-bar's is.
+
+    By mean absolute errors, which failed recordings do not rule: of x and y (m/s^2) and
+    of the angle (rad/s^2).
+    """
+    pose, _ = _errors(batch)
+    gain = jnp.asarray(gains(batch.scene.time_step, pose.shape[1]).pose_of_change)
+    reached = jnp.where(jnp.isnan(pose), jnp.nan, gain[:, None, None])
+    size = jnp.nanmean(jnp.abs(pose), axis=(0, 1, 2))
+    return _nonzero(size / jnp.nanmean(reached, axis=(0, 1, 2)))
+
+
+def _nonzero(size: Array) -> Array:
+    """Return a size, or 1 where there is none: of a disk that never turns, say."""
+    return jnp.where(size > _STILL, size, 1.0)
+
+
+def _known_motion(batch: PushBatch) -> Array:
+    """Return the true motion, or the simulated one where the truth is not known."""
+    if batch.simulated is None:
+        return jnp.nan_to_num(batch.truth)
+    return jnp.where(jnp.isnan(batch.truth), batch.simulated, batch.truth)

@@ -1,0 +1,242 @@
+"""One gradient step, compiled once: the batch is split over all devices."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import optax
+from jax import lax
+from jax.flatten_util import ravel_pytree
+from jax.sharding import NamedSharding, PartitionSpec
+from jaxtyping import Array
+
+from sainet.datasets.batch import PushBatch
+from sainet.engines.devices import BATCH, batch_mesh
+from sainet.learning.batch import predict_batch, to_target
+from sainet.learning.config import FitConfig
+from sainet.learning.loss import LossWeights, push_losses
+from sainet.models.interaction import InteractionNetwork
+
+_MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
+_CHUNK = 500  # pushes at a time: those of single steps are 20,000, and leave the cache
+
+Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
+
+
+class FitState(eqx.Module):
+    """All that changes while training: enough to go on from, bit for bit."""
+
+    network: InteractionNetwork
+    optimizer: Any
+    iteration: Array
+    average: Trained | None = None  # of the layers, where that is asked for
+
+    @property
+    def result(self) -> InteractionNetwork:
+        """The network that training would end with now."""
+        if self.average is None:
+            return self.network
+        return with_layers(self.network, self.average)
+
+
+def make_optimizer(config: FitConfig) -> optax.GradientTransformation:
+    """Return Adam with the paper's schedule, guarded against steps that explode."""
+    schedule = optax.exponential_decay(
+        config.learning_rate, config.halve_every, 0.5, staircase=True
+    )
+    chain = optax.chain(
+        optax.clip_by_global_norm(config.clip_norm), optax.adam(schedule)
+    )
+    return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
+
+
+def trained_layers(network: InteractionNetwork) -> Trained:
+    """Return the part of a network that is trained: all but its scales."""
+    return network.rel, network.dyn
+
+
+def with_layers(network: InteractionNetwork, layers: Trained) -> InteractionNetwork:
+    """Return the network with other weights."""
+    return eqx.tree_at(trained_layers, network, layers)
+
+
+def first_state(network: InteractionNetwork, config: FitConfig) -> FitState:
+    """Return the state before the first iteration."""
+    layers = trained_layers(network)
+    optimizer = make_optimizer(config).init(layers)
+    average = layers if config.average else None
+    return FitState(network, optimizer, jnp.zeros((), jnp.int32), average)
+
+
+def _averaged(
+    average: Trained, layers: Trained, config: FitConfig, done: Array
+) -> Trained:
+    """Return the exponential mean, over fewer iterations while there are few.
+
+    It must not remember for long how training began: the share of the new is that of
+    TensorFlow's `ExponentialMovingAverage` with `num_updates`.
+    """
+    share = jnp.maximum(1 / config.average, 9 / (10 + done))
+    return optax.incremental_update(layers, average, share)
+
+
+def data_loss(
+    network: InteractionNetwork, batch: PushBatch, weights: LossWeights, hold: int = 1
+) -> Array:
+    """Return the sum of the losses of the pushes of a batch (see `predict_batch`)."""
+    predicted = predict_batch(network, batch, hold)
+    return jnp.sum(push_losses(predicted, to_target(batch), weights))
+
+
+def make_gradient(
+    weights: LossWeights, hold: int = 1
+) -> Callable[[InteractionNetwork, PushBatch], tuple[Array, Trained]]:
+    """Return a function that sums loss and gradient over a batch on all devices.
+
+    The sums of the devices come together outside of what is compiled. XLA's own
+    all-reduce blocks a thread of the pool that the other device works with; on two
+    busy cores it was seen to wait for itself until it aborted the process.
+
+    Between devices JAX spends its time on the number of arrays, not on their size:
+    networks and gradients go as one array each. A batch goes by way of the host, where
+    it is not copied and every device takes its part.
+    """
+    everywhere = NamedSharding(batch_mesh(), PartitionSpec())
+    parts = NamedSharding(batch_mesh(), PartitionSpec(BATCH))
+    weights = jax.device_put(weights, everywhere)
+
+    def gradient(
+        network: InteractionNetwork, batch: PushBatch
+    ) -> tuple[Array, Trained]:
+        numbers, to_network = ravel_pytree(network)
+        numbers = jax.device_put(numbers, everywhere)
+        batch = jax.device_put(jax.device_get(batch), parts)
+        sums = _sum_on_devices(
+            weights, numbers, batch, to_network=to_network, hold=hold
+        )
+        return _total(jax.device_put(sums, jax.devices()[0]), trained_layers(network))
+
+    return gradient
+
+
+# Compiled once for each set of shapes, whatever the weights, seed and settings are.
+@partial(jax.jit, static_argnames=("to_network", "hold"))
+def _sum_on_devices(
+    weights: LossWeights,
+    numbers: Array,
+    batch: PushBatch,
+    *,
+    to_network: Callable[[Array], InteractionNetwork],
+    hold: int,
+) -> tuple[Array, Array]:
+    """Return the losses ``[chunk]`` and gradients ``[chunk number]`` of all devices."""
+
+    def of_part(
+        weights: LossWeights, numbers: Array, batch: PushBatch
+    ) -> tuple[Array, Array]:
+        return _sum_of_part(weights, to_network(numbers), batch, hold)
+
+    split = jax.shard_map(
+        of_part,
+        mesh=batch_mesh(),
+        in_specs=(PartitionSpec(), PartitionSpec(), PartitionSpec(BATCH)),
+        out_specs=PartitionSpec(BATCH),
+        check_vma=False,
+    )
+    return split(weights, numbers, batch)
+
+
+def _sum_of_part(
+    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
+) -> tuple[Array, Array]:
+    """Return the losses ``[chunk]`` and gradients ``[chunk number]`` of a device."""
+
+    def loss(layers: Trained, chunk: PushBatch) -> Array:
+        return data_loss(with_layers(network, layers), chunk, weights, hold)
+
+    def gradient(chunk: PushBatch) -> tuple[Array, Array]:
+        found, layers = jax.value_and_grad(loss)(trained_layers(network), chunk)
+        return found, ravel_pytree(layers)[0]
+
+    count = _chunk_count(batch.size)
+    chunks = jax.tree.map(lambda x: x.reshape(count, -1, *x.shape[1:]), batch)
+    return lax.map(gradient, chunks)
+
+
+def _chunk_count(pushes: int) -> int:
+    return -(-pushes // _CHUNK)
+
+
+@jax.jit
+def _total(sums: tuple[Array, Array], layers: Trained) -> tuple[Array, Trained]:
+    """Return the sum over all chunks, the gradient in the form of the layers."""
+    losses, rows = sums
+    to_layers = ravel_pytree(layers)[1]
+    return jnp.sum(losses), to_layers(jnp.sum(rows, axis=0))
+
+
+def make_step(
+    config: FitConfig, weights: LossWeights, start: Trained | None = None
+) -> Callable[[FitState, PushBatch], tuple[FitState, Array]]:
+    """Return the gradient step; its parts are compiled.
+
+    With layers to go on from, l2 draws towards these and not towards zero.
+
+    It takes the state, on the first device, and a batch that `even_batch` has filled
+    up, and returns the next state and the mean loss of the pushes, l2 left out.
+    """
+    if config.l2 is None:
+        raise ValueError("l2 is None; take the settings of FitConfig.for_pushes")
+    gradient, l2 = make_gradient(weights, config.hold), config.l2
+
+    def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
+        total, summed = gradient(state.network, batch)
+        pushes = jnp.sum(batch.is_observed)
+        after = _update(state, start, summed, pushes, config=config, l2=l2)
+        return after, total / pushes
+
+    return step
+
+
+# Compiled once for each set of settings, however many networks are trained by them.
+@partial(jax.jit, static_argnames=("config", "l2"))
+def _update(
+    state: FitState,
+    start: Trained | None,
+    summed: Trained,
+    pushes: Array,
+    *,
+    config: FitConfig,
+    l2: float,
+) -> FitState:
+    """Take Adam's step along the mean gradient of so many pushes, l2 added."""
+    layers = trained_layers(state.network)
+    change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
+    mean = jax.tree.map(lambda g, w: g / pushes + 2 * l2 * w, summed, change)
+    updates, moments = make_optimizer(config).update(mean, state.optimizer, layers)
+    layers = optax.apply_updates(layers, updates)
+    average = state.average
+    if average is not None:
+        average = _averaged(average, layers, config, state.iteration)
+    network = with_layers(state.network, layers)
+    return FitState(network, moments, state.iteration + 1, average)
+
+
+def even_batch(batch: PushBatch) -> PushBatch:
+    """Repeat the last push, unobserved, until devices and chunks divide the batch."""
+    devices = jax.device_count()
+    extra = -batch.size % (devices * _chunk_count(-(-batch.size // devices)))
+    if not extra:
+        return batch
+    padded = jax.tree.map(
+        lambda x: jnp.concatenate([x, jnp.repeat(x[-1:], extra, axis=0)]), batch
+    )
+    real = jnp.arange(batch.size + extra) < batch.size
+    return eqx.tree_at(
+        lambda b: (b.pose_observed, b.rate_observed),
+        padded,
+        (padded.pose_observed & real[:, None], padded.rate_observed & real[:, None]),
+    )

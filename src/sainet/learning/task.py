@@ -1,0 +1,267 @@
+"""What is trained on what, and where training begins."""
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.schema import simulated_name, variables
+from sainet.datasets.store import Store
+from sainet.engines.identified import IDENTIFIED
+from sainet.learning.assumed import AssumedEngine
+from sainet.learning.config import FROM_ENGINE, FitConfig, ModelKind
+from sainet.learning.loss import LossWeights
+from sainet.learning.mirror import mirror_some
+from sainet.learning.single_steps import to_single_steps
+from sainet.learning.split import split
+from sainet.learning.statistics import feature_scales, loss_weights
+from sainet.learning.step import FitState, first_state
+from sainet.models.card import CARD, Card
+from sainet.models.features import FeatureSizes
+from sainet.models.interaction import InteractionNetwork, Scales
+from sainet.models.widen import widen
+from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
+
+_STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
+_PLANAR = "planar"  # what an identified engine is with other numbers
+_ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
+# Settings that came later: a folder from before, which lacks them, had these.
+_LATER = {
+    "hold": 1,
+    "recurrent": True,
+    "features": "paper",
+    "terms": "motion",
+    "linear_from": 0.0,
+    "mirror": False,
+    "average": 0,
+    "validation_share": 0.0,
+    "patience": 0,
+}
+
+
+@dataclass(frozen=True)
+class Start:
+    """The network that training goes on from."""
+
+    network: InteractionNetwork
+    card: Card
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is trained on what."""
+
+    model: ModelKind
+    store: Store
+    config: FitConfig
+    assumed: AssumedEngine
+    start: Start | None = None  # None: weights are drawn
+    from_engine: bool = False  # drawn so that the network is the engine at first
+
+    @property
+    def inner(self) -> AssumedEngine | None:
+        """The assumed engine whose prediction the network sees."""
+        return self.assumed if self.model == "sain" else None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The arrays of the store that training reads."""
+        unread = ("truth_pusher", "group", "repeat", "published")
+        skip = lambda name: name.startswith(("simulated_", *unread))  # noqa: E731
+        kept = [name for name in variables(self.store.info) if not skip(name)]
+        if not self.assumed.is_stored:
+            return tuple(kept)
+        return (*kept, simulated_name(self.assumed.name))
+
+    @property
+    def sizes(self) -> FeatureSizes:
+        """What the network sees."""
+        place = self.config.features == "place"
+        return FeatureSizes(self.store.info.kind, self.model == "sain", place)
+
+    @cached_property
+    def training(self) -> Store:
+        """The pushes that are trained on."""
+        return self.store.take(self._split[0]) if self.validation else self.store
+
+    @cached_property
+    def validation(self) -> Store | None:
+        """The pushes that are kept for validation, if any."""
+        kept = self._split[1]
+        return self.store.take(kept) if len(kept) else None
+
+    @cached_property
+    def _split(self) -> tuple[np.ndarray, np.ndarray]:
+        config = self.config
+        return split(self.store.repeats(), config.validation_share, config.seed)
+
+    def complete(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return stored arrays with the prediction that the network sees."""
+        return self.inner.predict(arrays, self.store.info) if self.inner else arrays
+
+    def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
+        """Turn stored arrays into a batch with what the network sees."""
+        return self._batch(arrays, steps, self.inner)
+
+    def to_training_batch(
+        self, arrays: dict[str, np.ndarray], steps: int, iteration: int
+    ) -> PushBatch:
+        """Turn stored arrays into what an iteration is trained on."""
+        batch, config = self.to_batch(arrays, steps), self.config
+        if not config.mirror or config.features == "place":
+            return batch
+        return mirror_some(batch, config.seed, iteration)
+
+    def to_sample(self, arrays: dict[str, np.ndarray]) -> PushBatch:
+        """Return what statistics are of: s-bar stands in for an unknown truth."""
+        return self._batch(arrays, self.store.info.steps, self.assumed)
+
+    def _batch(
+        self, arrays: dict[str, np.ndarray], steps: int, inner: AssumedEngine | None
+    ) -> PushBatch:
+        info, steps = self.store.info, min(steps, self.config.steps)
+        arrays = inner.predict(arrays, info) if inner else arrays
+        seen = inner.name if inner else None
+        batch = to_batch(arrays, info, steps=steps, simulated=seen)
+        batch = inner.as_seen(batch) if inner and not inner.is_stored else batch
+        if self.config.recurrent:
+            return batch
+        # IN's statistics are of an engine's path too, but not of its single steps.
+        return to_single_steps(batch, self.inner.make() if self.inner else None)
+
+
+def check_data(task: Task) -> None:
+    """Raise `BadStore` or `BadInput` if the data lack what training needs."""
+    path = task.store.path
+    _check_assumed(task)
+    if task.from_engine and task.inner is None:
+        raise BadInput(
+            f"--start-from {FROM_ENGINE} needs a network that corrects an engine; "
+            f"train sain, not {task.model}."
+        )
+    if task.config.validation_share and task.validation is None:
+        raise BadInput(
+            f"--validation-share is {task.config.validation_share}; {path} has no two "
+            "pushes that are not repeats of each other."
+        )
+    if task.start:
+        _check_start(task, task.start)
+    if not task.config.recurrent:
+        _check_single_steps(task)
+
+
+def _check_assumed(task: Task) -> None:
+    info, path, name = task.store.info, task.store.path, task.assumed.name
+    if task.assumed.is_stored and name not in info.assumed_engines:
+        raise BadStore(
+            f"{path}: assumed_engines has no {name!r}; give --assumed-engine "
+            f"{' or '.join(info.assumed_engines)}, which it has, or the folder of an "
+            "identified engine."
+        )
+    if not task.assumed.is_stored and info.kind != "robot":
+        raise BadStore(
+            f"{path}: kind is {info.kind!r}; an identified engine predicts pushes of "
+            "the robot setup."
+        )
+
+
+def _check_start(task: Task, start: Start) -> None:
+    """Raise `BadCheckpoint` if training cannot go on from that network."""
+    info, card = task.store.info, start.card
+    wanted = {
+        "model": task.model,
+        "kind": info.kind,
+        "time_step": info.time_step,
+        "recurrent": task.config.recurrent,
+    }
+    for name, value in wanted.items():
+        found = getattr(card, name)
+        if found != value:
+            raise BadCheckpoint(
+                f"{start.folder / CARD}: {name} is {found!r}, this training's is "
+                f"{value!r}; give --start-from another network."
+            )
+    _check_inner_engine(task, start)
+    if card.features == "place" and task.config.features == "paper":
+        raise BadCheckpoint(
+            f"{start.folder / CARD}: features is 'place'; give --features place, too."
+        )
+
+
+def _check_inner_engine(task: Task, start: Start) -> None:
+    """Raise `BadCheckpoint` if what the network was trained around is too different.
+
+    An identified engine is the planar one with other numbers: a network that was
+    trained around that goes on from there.
+    """
+    found, wanted = start.card.inner_engine, task.inner.name if task.inner else None
+    alike = (_PLANAR, IDENTIFIED)
+    if found != wanted and not (wanted == IDENTIFIED and found in alike):
+        raise BadCheckpoint(
+            f"{start.folder / CARD}: inner_engine is {found!r}, this training's is "
+            f"{wanted!r}; give --start-from another network."
+        )
+
+
+def _check_single_steps(task: Task) -> None:
+    info, path = task.store.info, task.store.path
+    if info.kind != "robot" or info.engine == "recorded":
+        raise BadStore(
+            f"{path}: --no-recurrent needs simulated pushes of the robot setup, whose "
+            "state is known at every step; leave it out."
+        )
+    if task.inner and task.inner.make().on_host:
+        raise BadInput(
+            f"--assumed-engine {task.inner.name} cannot restart at every step of a "
+            "training; take planar, or leave --no-recurrent out."
+        )
+
+
+def settings(task: Task) -> dict[str, Any]:
+    """Return what decides the weights, as JSON values."""
+    config = asdict(task.config)
+    for name in _ONLY_WATCHES:
+        del config[name]
+    for name, before in _LATER.items():
+        if config[name] == before:
+            del config[name]
+    start = {"start_from": task.start.card.weights} if task.start else {}
+    start = {"start_from": FROM_ENGINE} if task.from_engine else start
+    computed = {} if task.assumed.is_stored else {"assumed": task.assumed.beliefs}
+    return {
+        "command": "train",
+        "model": task.model,
+        "assumed_engine": task.assumed.name,
+        **computed,
+        "data": task.store.content,
+        **start,
+        **config,
+    }
+
+
+def begin(task: Task) -> tuple[FitState, LossWeights]:
+    """Return the first state and the weights of the loss, from the data."""
+    store, config = task.training, task.config
+    few = slice(0, min(_STATISTICS_PUSHES, store.info.pushes))
+    sample = task.to_sample(store.read(few, task.names))
+    scales = feature_scales(sample, task.sizes, residual=task.from_engine)
+    network = _first_network(task, scales)
+    return first_state(network, config), loss_weights(sample, config)
+
+
+def _first_network(task: Task, scales: Scales) -> InteractionNetwork:
+    if task.start is None:
+        return InteractionNetwork(
+            task.sizes,
+            time_step=task.store.info.time_step,
+            key=jax.random.key(task.config.seed),
+            scales=scales,
+            residual=task.from_engine,
+        )
+    network = task.start.network
+    return widen(network, scales) if task.sizes != network.sizes else network

@@ -1,0 +1,1 @@
+"""Figures: arrays in, SVG or PNG files out."""

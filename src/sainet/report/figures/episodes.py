@@ -1,0 +1,101 @@
+"""Episodes of control in the manner of the paper's figure: start, goal and end."""
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+from sainet.report.episode_frames import outcome
+from sainet.report.figures.canvas import house_look, new_figure, save
+from sainet.report.palette import INK, MOVED, OTHER, PUSHED, TARGET
+
+_ACROSS = 3  # panels
+_TITLE_WIDTH = 26  # characters; a longer title would push its panel out of the figure
+_MARGIN = 10  # mm about everything that is drawn
+
+Record = Mapping[str, Any]
+Place = Sequence[float] | np.ndarray  # mm
+
+
+def draw_episodes(records: Sequence[Record], path: Path) -> Path:
+    """Draw each episode in a panel: disks at the start transparent, at the end solid.
+
+    The target region is the disk of the tolerance about the goal; the centre of the
+    moved disk at the end is a white cross.
+
+    Args:
+        records: as they are kept in the run folder of `sainet control`.
+        path: where to write; ``.svg`` or ``.png``.
+    """
+    across = min(_ACROSS, len(records))
+    down = math.ceil(len(records) / across)
+    with house_look():
+        figure = new_figure(0.4 + 2.9 * across, 0.3 + 2.6 * down)
+        panels = figure.subplots(down, across, squeeze=False).ravel()
+        # All panels have one scale: an episode is not larger for being shorter.
+        low, high = _extent(records)
+        for axes, record in zip(panels, records, strict=False):
+            draw_episode(axes, record)
+            axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        for axes in panels[len(records) :]:
+            axes.set_axis_off()
+        return save(figure, path)
+
+
+def _extent(records: Sequence[Record]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lower left and the upper right corner of all that is drawn (mm)."""
+    places = [body_paths(record)[..., :2].reshape(-1, 2) for record in records]
+    goals = np.array([record["goal_mm"] for record in records])
+    every = np.concatenate([*places, goals])
+    reach = _MARGIN + max(max(record["radius_mm"]) for record in records)
+    # What diverged has no place.
+    return np.nanmin(every, axis=0) - reach, np.nanmax(every, axis=0) + reach
+
+
+def draw_episode(axes: Axes, record: Record) -> None:
+    """Draw one episode (mm)."""
+    path = body_paths(record)
+    for body, radius in enumerate(record["radius_mm"]):
+        color = body_color(record, body)
+        centres = path[:, body, :2]
+        _disk(axes, centres[0], radius, facecolor=(color, 0.15), edgecolor=(color, 0.5))
+        _disk(axes, centres[-1], radius, facecolor=(color, 0.85), edgecolor=color)
+        axes.plot(*centres.T, color=color, linewidth=1.0)
+    _disk(axes, record["goal_mm"], record["tolerance_mm"], facecolor=TARGET, zorder=4)
+    end = path[-1, record["moved"], :2]
+    axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
+    said = textwrap.fill(outcome(record), _TITLE_WIDTH)
+    off = record["final_mm"]
+    axes.set_title(said if off is None else f"{said}\n{off:.1f} mm off")
+    axes.set_aspect("equal")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+
+
+def body_paths(record: Record) -> np.ndarray:
+    """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg).
+
+    NaN where they left the finite numbers.
+    """
+    turns = record["turns"]
+    if not turns:
+        return np.asarray([record["final"]], float)
+    parts = [[turns[0]["observed"]], *(turn["actual"] for turn in turns)]
+    return np.concatenate([np.asarray(part, float) for part in parts])
+
+
+def body_color(record: Record, body: int) -> str:
+    """Return the colour of a disk: the pushed one red, the moved one blue."""
+    if body == record["moved"]:
+        return MOVED
+    return PUSHED if body == 0 else OTHER
+
+
+def _disk(axes: Axes, centre: Place, radius: float, **look: Any) -> None:  # noqa: ANN401
+    look.setdefault("edgecolor", INK)
+    if np.isfinite(centre).all():
+        axes.add_patch(Circle((centre[0], centre[1]), radius, linewidth=0.8, **look))

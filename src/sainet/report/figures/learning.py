@@ -1,0 +1,90 @@
+"""How the loss fell while a network learned."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from scipy.ndimage import uniform_filter1d
+
+from sainet.report.figures.canvas import (
+    add_grid,
+    house_look,
+    label_ends,
+    new_figure,
+    save,
+)
+from sainet.report.palette import INK, ModelStyle, styles_of
+
+History = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+_WINDOW = 0.1  # share of the logged losses that a mean is of
+# How each kind of line looks.
+_BATCH: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.45}
+_MEAN: dict[str, Any] = {"linewidth": 1.6}
+_VALIDATION: dict[str, Any] = {"linestyle": ":", "marker": "o", "markersize": 3}
+
+
+def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
+    """Draw the loss of batches, its running mean and the validation loss.
+
+    Args:
+        histories: by model, iterations and training loss, iterations and validation
+            loss (both may be empty); losses have no unit.
+        path: where to write; ``.svg`` or ``.png``.
+    """
+    styles = styles_of(histories)
+    with house_look():
+        figure = new_figure(6.4, 3.4)
+        axes = figure.subplots()
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        for name, history in histories.items():
+            _draw_history(axes, styles[name], history)
+        axes.set(xlabel="iteration", ylabel="loss", title="Learning")
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
+        axes.margins(x=0.02)
+        add_grid(axes)
+        _explain_lines(axes, histories)
+        figure.draw_without_rendering()
+        ends = {name: _end(history) for name, history in histories.items()}
+        known = {name: end for name, end in ends.items() if end is not None}
+        label_ends(axes, [styles[name] for name in known], [*known.values()])
+        return save(figure, path)
+
+
+def running_mean(losses: Float[np.ndarray, " logged"]) -> Float[np.ndarray, " logged"]:
+    """Return the mean of the losses around each one; a batch's own says little."""
+    window = max(int(_WINDOW * len(losses)), 1)
+    return uniform_filter1d(losses, window, mode="nearest")
+
+
+def _draw_history(axes: Axes, style: ModelStyle, history: History) -> None:
+    iterations, training, checked, validation = map(np.asarray, history)
+    axes.plot(iterations, training, color=style.color, **_BATCH)
+    axes.plot(iterations, running_mean(training), color=style.color, **_MEAN)
+    axes.plot(checked, validation, color=style.color, **_VALIDATION)
+
+
+def _explain_lines(axes: Axes, histories: Mapping[str, History]) -> None:
+    kinds = {"training, each batch": _BATCH, "training, running mean": _MEAN}
+    if any(len(validation) for *_, validation in histories.values()):
+        kinds["validation"] = _VALIDATION
+    handles = [Line2D([], [], color=INK, label=name, **kinds[name]) for name in kinds]
+    axes.legend(handles=handles, loc="upper right")
+
+
+def _end(history: History) -> tuple[float, float] | None:
+    """Return where the curve of a model ends: validation's, else training's mean."""
+    iterations, training, checked, validation = map(np.asarray, history)
+    if len(validation):
+        return float(checked[-1]), float(validation[-1])
+    if len(training):
+        return float(iterations[-1]), float(running_mean(training)[-1])
+    return None

@@ -1,0 +1,1 @@
+"""Run folders, documents, hashes, worker processes and errors."""

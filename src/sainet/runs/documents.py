@@ -1,0 +1,111 @@
+"""Documents on disk: JSON, hashes, and writes that are whole or not at all."""
+
+import errno
+import hashlib
+import json
+import math
+import os
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from sainet.runs.errors import BadInput
+
+
+FORMAT_VERSION = 1
+
+
+def to_json(value: object) -> str:
+    """Return JSON text: sorted keys, so that the same value is the same bytes."""
+    return json.dumps(value, indent=2, sort_keys=True, allow_nan=False) + "\n"
+
+
+def content_hash(data: bytes) -> str:
+    """Return the SHA-256 of bytes, in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Give a temporary path that takes the place of `path` if all went well.
+
+    Whoever reads `path` sees the old file or the new one, never a part of it.
+
+    Raises:
+        BadInput: the disk is full or the folder cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        raise write_error(path, error) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def write_error(path: Path, error: OSError) -> BadInput:
+    """Say what stopped a write, in one line."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+        return BadInput(
+            f"{path}: the disk is full; make room, then run the same command again."
+        )
+    return BadInput(f"{path}: cannot be written ({error.strerror}); choose another.")
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file atomically."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write a JSON file atomically."""
+    write_bytes(path, to_json(value).encode())
+
+
+@contextmanager
+def readable(path: Path, error: type[BadInput] = BadInput) -> Iterator[None]:
+    """Say in one line why a path that is looked at cannot be.
+
+    Raises:
+        BadInput: or the given subclass; the name is too long, say.
+    """
+    try:
+        yield
+    except OSError as cause:
+        raise error(
+            f"{path}: cannot be read ({cause.strerror}); choose another."
+        ) from None
+
+
+def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Raises:
+        BadInput: or the given subclass, when it is missing or no JSON object.
+    """
+    try:
+        value = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise error(f"{path}: no such file; was it made by sainet?") from None
+    except (OSError, ValueError, RecursionError) as cause:
+        reason = str(cause).splitlines()[0]
+        raise error(f"{path}: cannot be read as JSON ({reason}).") from None
+    if not isinstance(value, dict):
+        raise error(f"{path}: must hold a JSON object, not a {type(value).__name__}.")
+    return value
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value that was read from JSON is a finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return False

@@ -1,0 +1,1 @@
+"""Scenes, states, shapes, pushes and controls."""

@@ -1,0 +1,72 @@
+"""Pushes: the parameters of one, the grid of 72, and the pusher's start."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sainet.scenes.geometry import direction, unit
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
+
+
+class Push(eqx.Module):
+    """A straight push: where it starts on the disk, where it goes and how fast.
+
+    The contact angle is about the axis from disk 1 to disk 2 (one disk: the table's
+    x axis), measured from the back of disk 1; the direction is from the normal.
+    """
+
+    contact_angle: Float[Array, "*batch"]  # rad
+    direction: Float[Array, "*batch"]  # rad
+    length: Float[Array, "*batch"]  # m
+    speed: Float[Array, "*batch"]  # m/s
+
+
+class PushGrid(eqx.Module):
+    """The paper's 12 by 6 pushes: midpoints of the bins of both angles."""
+
+    contact_bins: int = 12
+    direction_bins: int = 6
+    contact_range: float = np.pi / 3  # rad, to either side
+    direction_range: float = np.pi / 6  # rad, to either side
+    length: float = 0.010  # m
+    speed: float = 0.050  # m/s
+
+    def pushes(self) -> Push:
+        """Return all pushes as one batch, the directions running fastest."""
+        contact = _midpoints(self.contact_bins, self.contact_range)
+        angle = _midpoints(self.direction_bins, self.direction_range)
+        contact, angle = jnp.meshgrid(contact, angle, indexing="ij")
+        same = jnp.ones(contact.size)
+        return Push(
+            contact_angle=contact.ravel(),
+            direction=angle.ravel(),
+            length=self.length * same,
+            speed=self.speed * same,
+        )
+
+
+def _midpoints(bins: int, reach: float) -> Float[Array, " bin"]:
+    return (jnp.arange(bins) + 0.5) / bins * (2 * reach) - reach
+
+
+def push_axis(state: State) -> Float[Array, "*batch"]:
+    """Return the angle of the axis that contact angles are measured about (rad)."""
+    if state.body_count == 1:
+        return jnp.zeros_like(state.angle[..., 0])
+    return direction(state.position[..., 1, :] - state.position[..., 0, :])
+
+
+def place_pusher(
+    scene: Scene, state: State, push: Push, *, gap: float = 0.0
+) -> Float[Array, "*batch 2"]:
+    """Return where the pusher starts (m): on disk 1, `gap` away from its surface."""
+    normal = unit(push_axis(state) + push.contact_angle)
+    reach = scene.radius[..., 0] + scene.pusher_radius + gap
+    return state.position[..., 0, :] - reach[..., None] * normal
+
+
+def push_direction(state: State, push: Push) -> Float[Array, "*batch 2"]:
+    """Return the unit vector along which the pusher moves or pushes."""
+    return unit(push_axis(state) + push.contact_angle + push.direction)

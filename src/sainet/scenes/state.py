@@ -1,0 +1,112 @@
+"""States of disks and pusher, and trajectories of states.
+
+Units are metres, radians, kilograms and seconds, in the table frame.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from sainet.runs.errors import BadScene
+
+
+class State(eqx.Module):
+    """Where the bodies and the pusher are and how they move."""
+
+    position: Float[Array, "*batch body 2"]  # m
+    angle: Float[Array, "*batch body"]  # rad, counter-clockwise, never wrapped
+    velocity: Float[Array, "*batch body 2"]  # m/s
+    spin: Float[Array, "*batch body"]  # rad/s
+    pusher_position: Float[Array, "*batch 2"]  # m
+    pusher_velocity: Float[Array, "*batch 2"]  # m/s
+
+    @property
+    def body_count(self) -> int:
+        """The number of disks."""
+        return self.angle.shape[-1]
+
+
+class Trajectory(eqx.Module):
+    """The states after each step; the initial one is not repeated.
+
+    Every field of `states` has a time axis right after the batch axes. In every
+    engine and model ``p(t+1) = p(t) + dt * v(t+1)``, penetration recovery included.
+    """
+
+    states: State
+
+    @property
+    def final(self) -> State:
+        """The state after the last step."""
+        return _at_step(self.states, -1)
+
+    @property
+    def is_finite(self) -> Bool[Array, "*batch time"]:
+        """Whether the disks' poses and velocities are numbers, step by step."""
+        states = self.states
+        pose = jnp.isfinite(states.position).all((-1, -2))
+        motion = jnp.isfinite(states.velocity).all((-1, -2))
+        turn = jnp.isfinite(states.angle + states.spin).all(-1)
+        return pose & motion & turn
+
+
+def _at_step(states: State, step: int) -> State:
+    return State(
+        position=states.position[..., step, :, :],
+        angle=states.angle[..., step, :],
+        velocity=states.velocity[..., step, :, :],
+        spin=states.spin[..., step, :],
+        pusher_position=states.pusher_position[..., step, :],
+        pusher_velocity=states.pusher_velocity[..., step, :],
+    )
+
+
+def at_rest(
+    position: Float[Array, "*batch body 2"],
+    angle: Float[Array, "*batch body"],
+    pusher_position: Float[Array, "*batch 2"],
+) -> State:
+    """Return the state in which nothing moves."""
+    return State(
+        position=position,
+        angle=angle,
+        velocity=jnp.zeros_like(position),
+        spin=jnp.zeros_like(angle),
+        pusher_position=pusher_position,
+        pusher_velocity=jnp.zeros_like(pusher_position),
+    )
+
+
+def pack_motion(state: State) -> Float[Array, "*batch body 6"]:
+    """Pack each disk's x, y, angle and their rates into six numbers.
+
+    This one array is what stores and networks work on.
+    """
+    pose = jnp.concatenate([state.position, state.angle[..., None]], axis=-1)
+    rate = jnp.concatenate([state.velocity, state.spin[..., None]], axis=-1)
+    return jnp.concatenate([pose, rate], axis=-1)
+
+
+def unpack_motion(
+    motion: Float[Array, "*batch body 6"],
+    pusher_position: Float[Array, "*batch 2"],
+    pusher_velocity: Float[Array, "*batch 2"],
+) -> State:
+    """Undo `pack_motion`."""
+    return State(
+        position=motion[..., 0:2],
+        angle=motion[..., 2],
+        velocity=motion[..., 3:5],
+        spin=motion[..., 5],
+        pusher_position=pusher_position,
+        pusher_velocity=pusher_velocity,
+    )
+
+
+def check_state(state: State, source: str = "state") -> None:
+    """Raise `BadScene` if a pose or a velocity is not a finite number."""
+    pusher = ("pusher_position", "pusher_velocity")
+    for name in ("position", "angle", "velocity", "spin", *pusher):
+        if not np.isfinite(np.asarray(getattr(state, name))).all():
+            raise BadScene(f"{source}: {name} holds NaN or infinity; remove that push.")

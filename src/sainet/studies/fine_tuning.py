@@ -1,0 +1,117 @@
+"""How to fine-tune on few pushes, chosen on simulated robots (see `stand_in`)."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from sainet.datasets.store import Store
+from sainet.learning.config import FROM_ENGINE
+from sainet.models.registry import load_dynamics
+from sainet.studies.chain import Chain
+from sainet.studies.config import Scale
+from sainet.studies.few_pushes import recipe
+from sainet.studies.paper_setup import join
+from sainet.studies.stand_in import ROBOTS, Robot, recordings
+
+Change = dict[str, Any]
+
+# The defaults, and what else they could be, one thing at a time.
+CHANGES: tuple[Change, ...] = (
+    {},
+    {"features": "place"},
+    {"learning_rate": 3e-4},
+    {"learning_rate": 3e-3},
+    {"iterations": 300, "halve_every": 200},
+    {"l2": 1e-4},
+    {"l2": 1e-3},
+    {"l2": 1e-2},
+    {"linear_from": 0.0},
+    {"weight_rotation": 1.0},
+    {"mirror": False},
+    {"average": 0},
+    {"hold": 1},
+    {"validation_share": 0.2, "patience": 250},
+)
+WAYS = (("sain-stroke", {}), *product([FROM_ENGINE], CHANGES))
+# With few pushes what matters is how far the network may leave the engine.
+WAYS_WITH_FEW = tuple(
+    product([FROM_ENGINE], ({}, {"l2": 1e-3}, {"l2": 1e-2}, {"l2": 0.1}))
+)
+_TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
+_FEW = {"quick": 10, "paper": 25}
+
+
+def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+    """Tune in every way that is considered, for every robot; returns the table.
+
+    Returns:
+        The rows of each robot, number of pushes and way, and in `choices` the `scores`
+        of each way: position and rotation errors over those of physics, their mean, by
+        robot. `score` is the mean over the robots.
+    """
+    tables, choices = [], []
+    tuners = [_tuner(robot, scale, chain) for robot in ROBOTS]
+    with_few = [each.with_few() for each in tuners]
+    for several, ways in ((tuners, WAYS), (with_few, WAYS_WITH_FEW)):
+        for start, change in ways:
+            found = {each.robot: each.tune(start, change) for each in several}
+            tables += found.values()
+            scores = {name: _score(table["rows"]) for name, table in found.items()}
+            choices.append(
+                {
+                    "pushes": several[0].training.info.pushes,
+                    "start": start,
+                    "change": change,
+                    "score": float(np.mean([*scores.values()])),
+                    "scores": scores,
+                }
+            )
+    table = join(tables) | {"choices": choices}
+    return chain.finish(table)
+
+
+@dataclass(frozen=True)
+class _Tuner:
+    """Tunes on the recordings of one robot."""
+
+    robot: str
+    training: Store
+    tests: Store
+    scale: Scale
+    chain: Chain
+
+    def with_few(self) -> "_Tuner":
+        """Return what tunes on the first of the recordings alone."""
+        return replace(self, training=self.training.first(_FEW[self.scale]))
+
+    def tune(self, start: str, change: Change) -> dict[str, Any]:
+        """Return the table of the tests."""
+        pushes = self.training.info.pushes
+        config = recipe(start, self.scale, pushes, change)
+        way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
+        name = f"{self.robot}/{pushes}-pushes/{way}"
+        result = self.chain.train(
+            "sain", self.training, config, name=name, start_from=start
+        )
+        tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")
+        models = [load_dynamics("physics"), tuned]
+        found = self.chain.compare(models, self.tests, steps=0).to_dict()
+        for row in (*found["rows"], *found["comparisons"]):
+            row["group"] = name
+        return found
+
+
+def _tuner(robot: Robot, scale: Scale, chain: Chain) -> _Tuner:
+    training = recordings(robot, "training", _TRAINING[scale], 0, chain)
+    tests = recordings(robot, "tests", _TESTS[scale], 1, chain)
+    return _Tuner(robot.name, training, tests, scale, chain)
+
+
+def _score(rows: list[dict[str, Any]]) -> float:
+    errors = {
+        row["model"]: np.array([row["final_pos_mm"], row["final_rot_deg"]])
+        for row in rows
+    }
+    return float(np.mean(errors["sain-tuned"] / errors["physics"]))

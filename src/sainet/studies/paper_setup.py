@@ -1,0 +1,173 @@
+"""The paper's two setups with Bullet as the truth: data and networks, made once.
+
+All experiments of one setup and scale share one folder, so that what one has
+simulated or trained, no other makes again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from sainet.datasets.bystander import add_bystander
+from sainet.datasets.config import GenerateConfig, Setup
+from sainet.datasets.store import Store
+from sainet.learning.config import FitConfig
+from sainet.studies.chain import Chain
+from sainet.studies.config import Scale
+from sainet.studies.few_pushes import recipe
+from sainet.studies.trainings import Training
+
+AROUND = {
+    "sain-bullet": "bullet",
+    "sain": "planar",
+    "sain-calibrated": "planar-calibrated",
+}
+NETWORKS = ("in", *AROUND)
+BYSTANDER = "bystander"  # what networks are called that went on beside one
+_CHUNK = 250  # pushes
+_TEST_SEED, _VALIDATION_SEED = 1, 2
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is simulated and trained."""
+
+    pushes: int
+    tests: int
+    iterations: int
+
+
+SIZES = {"quick": Sizes(500, 100, 300), "paper": Sizes(4500, 500, 10_000)}
+
+
+@dataclass(frozen=True)
+class PaperSetup:
+    """One of the paper's setups at one scale."""
+
+    setup: Setup
+    scale: Scale
+    chain: Chain  # of the shared folder
+
+    @property
+    def sizes(self) -> Sizes:
+        """How much is simulated and trained."""
+        return SIZES[self.scale]
+
+    def training_pushes(self) -> Store:
+        """Return the pushes that networks are trained on, every s-bar with them."""
+        around = tuple(AROUND.values())
+        return self._simulate("train", self.sizes.pushes, assumed_engine=around)
+
+    def test_pushes(self, name: str = "test-2-disks", **changes: Any) -> Store:  # noqa: ANN401
+        """Return the test pushes, or others of the same number with other settings."""
+        return self._simulate(name, self.sizes.tests, seed=_TEST_SEED, **changes)
+
+    def validation_pushes(self) -> Store:
+        """Return pushes to choose settings by: neither trained nor tested on."""
+        return self._simulate("validation", self.sizes.tests, seed=_VALIDATION_SEED)
+
+    def training_pushes_with_bystander(self) -> Store:
+        """Return the same pushes, beside each a disk that nothing touches."""
+        store, name = self.training_pushes(), "train-bystander"
+        total = store.info.pushes * len(store.info.assumed_engines)
+        with self.chain.bar(f"Predicting s-bar of {name}", total) as advance:
+            return add_bystander(
+                store, self.chain.out / name, on_pushes=lambda n: advance(n, "")
+            )
+
+    def train(
+        self,
+        names: Sequence[str],
+        seeds: Sequence[int],
+        *,
+        form: str = "",
+        pushes: int | None = None,
+        **changes: Any,  # noqa: ANN401
+    ) -> dict[str, list[str]]:
+        """Train some of `NETWORKS`; returns the names of each one's folders.
+
+        Args:
+            names: of the networks.
+            seeds: a training of each network for each.
+            form: of the training, where it is not the usual one: goes into the names.
+            pushes: how many of the training pushes to use; None is all.
+            changes: settings of the training that are not the paper's.
+        """
+        count = self.sizes.pushes if pushes is None else pushes
+        usual = FitConfig(iterations=self.sizes.iterations, batch_size=min(100, count))
+        store, config = self.training_pushes().first(count), replace(usual, **changes)
+        return self.chain.train_seeds(
+            {name: self._training(name, store, config, form) for name in names}, seeds
+        )
+
+    def train_beside_bystander(
+        self, names: Sequence[str], seeds: Sequence[int]
+    ) -> dict[str, list[str]]:
+        """Let trained ones of `NETWORKS` go on, beside a disk that nothing touches.
+
+        With the settings that hold for going on from any network, but for the steps,
+        which are those that the network was trained on.
+        """
+        store = self.training_pushes_with_bystander()
+        changes = {"steps": FitConfig.steps}
+        trainings = {}
+        for name in names:
+            config = recipe(name, self.scale, store.info.pushes, changes)
+            training = self._training(name, store, config, BYSTANDER)
+            trainings[name] = replace(training, start_from=str(self.chain.out / name))
+        return self.chain.train_seeds(trainings, seeds)
+
+    def _training(
+        self, name: str, store: Store, config: FitConfig, form: str
+    ) -> Training:
+        return Training(
+            "in" if name == "in" else "sain",
+            store,
+            config,
+            self.chain.out / with_form(name, form),
+            AROUND.get(name, "planar"),
+        )
+
+    def compare(
+        self,
+        trainings: Mapping[str, Sequence[str]],
+        tests: Store,
+        *,
+        group: str | None = None,
+    ) -> dict[str, Any]:
+        """Return the table of physics (Bullet) and networks, of one group if named."""
+        table = self.chain.compare_trainings(trainings, tests, engine="bullet")
+        found = table.to_dict()
+        if group is not None:
+            for row in (*found["rows"], *found["comparisons"]):
+                row["group"] = group
+        return found
+
+    def _simulate(self, name: str, pushes: int, **changes: Any) -> Store:  # noqa: ANN401
+        config = GenerateConfig(
+            setup=self.setup,
+            pushes=pushes,
+            engine="bullet",
+            chunk_size=min(_CHUNK, pushes),  # whole chunks are simulated
+            **changes,
+        )
+        return self.chain.simulate(name, config)
+
+
+def with_form(name: str, form: str) -> str:
+    """Return what a network is called whose training has a form of its own."""
+    return "-".join(part for part in (name, form) if part)
+
+
+def paper_setup(setup: Setup, scale: Scale, chain: Chain) -> PaperSetup:
+    """Return a setup whose folder lies beside that of the experiment."""
+    shared = replace(chain, out=chain.out.parent / f"{setup}-{scale}")
+    return PaperSetup(setup, scale, shared)
+
+
+def join(tables: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return one table of the rows and comparisons of several."""
+    return {
+        part: [row for table in tables for row in table[part]]
+        for part in ("rows", "comparisons")
+    }

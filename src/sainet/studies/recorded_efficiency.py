@@ -1,0 +1,63 @@
+"""How many recorded pushes of a surface a model needs: 25 to 400, cross-validated.
+
+The smaller sets are parts of the greater ones. A surface with fewer pushes than a size
+asks for gives all that it has.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from sainet.datasets.store import Store
+from sainet.evaluation.folds import Fold, fold_of_push, join_folds, make_folds
+from sainet.report.figures.efficiency import draw_data_efficiency
+from sainet.studies.chain import Chain
+from sainet.studies.config import Scale
+from sainet.studies.paper_setup import join
+from sainet.studies.recorded_models import Tuner, Variant, surfaces_of
+from sainet.studies.recorded_pushes import FOLDS, told
+
+PUSHES = {"quick": (10, 20), "paper": (25, 50, 100, 200, 400)}
+VARIANTS = (
+    Variant("in", "tuned"),
+    Variant("sain", "tuned"),
+    Variant("sain", "tuned", "identified"),
+    Variant("sain", "residual", "identified"),
+)
+
+
+def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+    """Tune on ever more recorded pushes; returns the table.
+
+    Its groups are numbers of training pushes, over all surfaces together.
+
+    Raises:
+        BadInput: no recorded pushes were given.
+    """
+    store = chain.recorded_pushes()
+    tables = []
+    for pushes in PUSHES[scale]:
+        parts = []
+        for surface, rows in surfaces_of(store).items():
+            for fold in make_folds(store, FOLDS[scale], rows):
+                folder = f"{pushes}/{surface}/fold-{fold.number}"
+                tuner = Tuner(_first(fold, pushes), folder, scale, chain)
+                models = [*tuner.physics(), *tuner.models(VARIANTS)]
+                parts.append((fold, chain.compare(models, fold.tests)))
+        whole = join_folds(parts)
+        groups = (f"{pushes:,}",) * len(whole.groups)
+        tables.append(told(replace(whole, groups=groups)))
+    table = join(tables)
+    table["published"] = [row for one in tables for row in one["published"]]
+    chain.finish(table)
+    draw_data_efficiency(table, chain.out / "recorded-data-efficiency.svg")
+    return table
+
+
+def _first(fold: Fold, pushes: int) -> Store:
+    """Return so many training pushes of a fold, repeats beside each other."""
+    repeats = fold.training.repeats()
+    kinds = fold_of_push(repeats, len(np.unique(repeats)), seed=fold.number)
+    chosen = np.argsort(kinds, kind="stable")[:pushes]
+    return fold.training.take(chosen)

@@ -1,0 +1,121 @@
+"""The report of a run folder: what it holds, whichever command made it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sainet.control.record import read_record
+from sainet.control.trials import FOLDER
+from sainet.engines.identified import FILE as IDENTIFIED
+from sainet.models.card import CARD, read_card
+from sainet.report.pages.page import REPORT, Report, to_page
+from sainet.runs.documents import read_json
+from sainet.runs.errors import BadInput
+from sainet.runs.folders import CONFIG
+from sainet.runs.manifest import MANIFEST
+from sainet.studies.chain import TABLE
+
+_EPISODES = 6  # that play
+# The figures that commands leave in their folders, and what one sees there.
+_FIGURES = {
+    "learning-curve": "The loss while the network learned.",
+    "paths": "Predicted paths of one push against the true one.",
+    "error-over-time": "Mean position error of each disk over the time of a push.",
+    "episodes": "Shapes at the start (faint) and at the end, and the goal.",
+    "data-efficiency": "Errors over training pushes, as many iterations for all.",
+    "recorded-data-efficiency": "Errors over recorded training pushes.",
+    "engine-errors": "What engines miss of the end of a push: by place and direction.",
+}
+
+
+def report_of(folder: Path) -> Report:
+    """Collect what a run folder holds: table, figures, episodes, cards.
+
+    Raises:
+        BadInput: there is no such folder, nothing to show in it, or what is there is
+            damaged.
+    """
+    if not folder.is_dir():
+        raise BadInput(f"{folder}: no such folder; give one that sainet made.")
+    table = _json(folder / TABLE)
+    card = read_card(folder).to_dict() if (folder / CARD).is_file() else {}
+    identified = _json(folder / IDENTIFIED)
+    episodes = [read_record(path) for path in _episode_files(folder)]
+    figures = tuple(_figures(folder))
+    if not (table or card or identified or episodes or figures):
+        raise BadInput(f"{folder}: nothing to show in it{_way_out(folder)}.")
+    settings = {**_json(folder / CONFIG), **card}
+    made = settings.pop("manifest", None) or _json(folder / MANIFEST)
+    command = settings.get("command")
+    return Report(
+        title=folder.resolve().name,
+        subtitle=f"What 'sainet {command}' left there" if command else "",
+        summary="\n\n".join(_estimates(identified)),
+        table=table or None,
+        figures=figures,
+        episodes=episodes,
+        manifest=settings | made,
+        commands=(f"sainet report {folder}",),
+    )
+
+
+def is_of_demo(folder: Path) -> bool:
+    """Whether the demo made the folder: its report says more than this one would."""
+    return (
+        _json(folder / CONFIG).get("command") == "demo" and (folder / REPORT).exists()
+    )
+
+
+def page_of(folder: Path) -> str:
+    """Return the report of a run folder as one HTML page.
+
+    Raises:
+        BadInput: see `report_of`.
+    """
+    try:
+        return to_page(report_of(folder))
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        raise BadInput(
+            f"{folder}: what is in there is damaged or of another program "
+            f"({type(error).__name__}: {error}); make it again."
+        ) from error
+
+
+def _json(path: Path) -> dict[str, Any]:
+    return read_json(path) if path.is_file() else {}
+
+
+def _episode_files(folder: Path) -> list[Path]:
+    files = sorted((folder / FOLDER).glob("[0-9]*.json"))
+    return [path for path in files if path.suffixes == [".json"]][:_EPISODES]
+
+
+def _figures(folder: Path) -> Iterator[tuple[Path, str]]:
+    for name, told in _FIGURES.items():
+        if (folder / f"{name}.svg").is_file():
+            yield folder / f"{name}.svg", told
+
+
+def _estimates(identified: dict[str, Any]) -> Iterator[str]:
+    """Yield what was identified, in sentences."""
+    for estimate in identified.get("estimates", ()):
+        name = estimate["name"].replace("_", " ")
+        if estimate["doubt"]:
+            yield f"The data cannot tell {name}: {estimate['doubt']}."
+        else:
+            yield (
+                "{name}: {value:.3g} [{low:.3g}, {high:.3g}], {start:.3g} before."
+            ).format(**estimate | {"name": name.capitalize()})
+    if identified:
+        yield (
+            "Mean errors of {pushes} pushes: position {before_mm:.2f} mm before, "
+            "{after_mm:.2f} mm after; rotation {before_deg:.2f} and {after_deg:.2f} "
+            "degrees."
+        ).format(**identified)
+
+
+def _way_out(folder: Path) -> str:
+    """Name folders in it that have something to show."""
+    known = sorted(path.parent for path in folder.glob(f"*/{TABLE}"))
+    known += sorted(path.parent for path in folder.glob(f"*/{CARD}"))
+    return f"; give {known[0]}, say" if known else ""

@@ -1,0 +1,1 @@
+"""The simulated world: what executes pushes, with noise."""

@@ -1,0 +1,292 @@
+"""Going on from a trained network: on few pushes, known at their ends alone."""
+
+import shutil
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+from learning.stores import end_points_alone, info_of, made_up, write
+from sainet.datasets.batch import to_batch, to_controls, to_initial
+from sainet.engines.identified import beliefs_of, engine_of_beliefs
+from sainet.learning import fit as fit_module
+from sainet.learning.assumed import find_assumed_engine
+from sainet.learning.batch import path_to_frame, predict_batch
+from sainet.learning.best import Best
+from sainet.learning.config import FINE_TUNING, FitConfig
+from sainet.learning.fit import fit
+from sainet.learning.statistics import loss_weights
+from sainet.learning.step import trained_layers
+from sainet.learning.task import Start, Task, begin
+from sainet.models.card import read_card
+from sainet.models.checkpoint import load_network
+from sainet.models.dynamics import predict
+from sainet.models.frame import push_frame
+from sainet.models.registry import load_dynamics
+from sainet.runs.documents import write_json
+from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+from sainet.scenes.state import pack_motion
+
+PLANAR = find_assumed_engine("planar")
+BEFORE = FitConfig(iterations=3, batch_size=4, steps=12, log_every=1)
+TUNING = replace(
+    FINE_TUNING,
+    iterations=8,
+    batch_size=4,
+    validation_share=0.2,
+    log_every=1,
+    checkpoint_every=2,
+)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    info = info_of(20, engine="recorded", seed=None)
+    arrays = end_points_alone(made_up(info))
+    return write(tmp_path_factory.mktemp("recorded") / "data", info, arrays)
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("start")
+    info = info_of(20)
+    simulated = write(folder / "data", info, made_up(info, seed=1))
+    for model in ("in", "sain"):
+        fit(model, simulated, BEFORE, folder / model)
+    return folder
+
+
+def layers(folder):
+    return jax.tree.leaves(load_network(folder)[0])
+
+
+def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
+    out = tmp_path / "out"
+    fit("sain", store, TUNING, out, start_from=str(start / "sain"))
+    card, before = read_card(out), read_card(start / "sain")
+    assert card.started_from == before.weights
+    assert (before.data_seeds, card.data_seeds) == ([0], [0])
+    assert (card.truth_engine, card.features) == ("recorded", "paper")
+    task = Task("sain", store, TUNING, PLANAR, load(start / "sain"))
+    first = begin(task)[0].network
+    for found, known in zip(
+        jax.tree.leaves(first), layers(start / "sain"), strict=True
+    ):
+        np.testing.assert_array_equal(found, known)
+    changed = [
+        np.abs(a - b).max()
+        for a, b in zip(layers(out), layers(start / "sain"), strict=True)
+    ]
+    assert max(changed) < 0.1  # from there, not from anywhere
+
+
+def load(folder):
+    return Start(*load_network(folder), folder)
+
+
+def test_a_network_learns_to_see_the_place(store, start, tmp_path):
+    out = tmp_path / "out"
+    seeing = replace(TUNING, features="place", validation_share=0.0)
+    fit("in", store, seeing, out, start_from=str(start / "in"))
+    network, card = load_network(out)
+    assert card.features == "place"
+    assert network.sizes.place
+    known = load_network(start / "in")[0].sizes.body
+    assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
+    with pytest.raises(BadCheckpoint, match="give --features place, too"):
+        fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
+
+
+def test_l2_draws_what_is_added_to_the_engine_to_its_first_weights(store, tmp_path):
+    drawn = replace(TUNING, validation_share=0.0, average=0, l2=1e6)
+    fit("sain", store, drawn, tmp_path / "out", start_from="engine")
+    task = Task("sain", store, drawn, PLANAR, from_engine=True)
+    first = trained_layers(begin(task)[0].network)
+    found = trained_layers(load_network(tmp_path / "out")[0])
+    # Drawn to zero, each weight would have gone the learning rate at every iteration.
+    far = drawn.iterations * drawn.learning_rate
+    for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(first), strict=True):
+        assert np.abs(one - other).max() < far / 2
+
+
+def test_a_network_that_starts_from_the_engine_goes_on_adding_to_it(store, tmp_path):
+    first, on = tmp_path / "first", tmp_path / "on"
+    fit("sain", store, TUNING, first, start_from="engine")
+    network, card = load_network(first)
+    assert (network.residual, card.residual, card.started_from) == (True, True, None)
+    assert np.abs(network.dyn.weights[-1]).max() > 0  # it has learned something
+    task = Task("sain", store, TUNING, PLANAR, from_engine=True)
+    silent = begin(task)[0].network
+    batch = task.to_batch(store.read(slice(None)), store.info.steps)
+    frame = push_frame(batch.scene, batch.initial)
+    np.testing.assert_allclose(
+        predict_batch(silent, batch)[..., 3:],
+        path_to_frame(batch.simulated, frame)[..., 3:],
+        atol=1e-5,
+    )
+    seeing = replace(TUNING, features="place")
+    fit("sain", store, seeing, on, start_from=str(first))
+    assert load_network(on)[0].residual
+    assert read_card(on).started_from == card.weights
+    with pytest.raises(RunConflict, match="start_from"):
+        fit("sain", store, TUNING, first)
+    with pytest.raises(BadInput, match="train sain, not in"):
+        fit("in", store, TUNING, tmp_path / "no", start_from="engine")
+    assert not (tmp_path / "no").exists()
+
+
+def test_the_best_network_on_the_validation_pushes_is_kept(
+    store, start, tmp_path, monkeypatch
+):
+    told = iter([0.9, 0.8, 0.3, 0.5, 0.4, 0.6, 0.7, 0.7, 0.7])
+    kept = []
+
+    def validation(task, weights):
+        def validate(network):
+            kept.append(network)
+            return next(told)
+
+        return validate
+
+    monkeypatch.setattr(fit_module, "_make_validation", validation)
+    patient = replace(TUNING, patience=4)
+    result = fit("in", store, patient, tmp_path / "out", start_from=str(start / "in"))
+    # The first figure is of the start, the third, of iteration 2, is the best.
+    assert [line["iteration"] for line in result.history] == [1, 2, 3, 4, 5, 6]
+    for found, wanted in zip(
+        layers(tmp_path / "out"), jax.tree.leaves(kept[2]), strict=True
+    ):
+        np.testing.assert_array_equal(found, wanted)
+
+
+class Stopped(Exception):
+    pass
+
+
+def test_an_interrupted_tuning_ends_in_the_same_network(store, start, tmp_path):
+    patient = replace(TUNING, patience=6)
+    words = {"start_from": str(start / "sain")}
+    fit("sain", store, patient, tmp_path / "whole", **words)
+
+    def stop(iteration, loss):
+        if iteration == 3:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        fit("sain", store, patient, tmp_path / "cut", on_step=stop, **words)
+    fit("sain", store, patient, tmp_path / "cut", **words)
+    for name in ("network.safetensors", "log.jsonl"):
+        whole, cut = ((tmp_path / run / name).read_bytes() for run in ("whole", "cut"))
+        assert whole == cut
+
+
+def test_validation_pushes_are_drawn_at_random_and_not_trained_on(store):
+    task = Task("in", store, TUNING, PLANAR)
+    training, validation = set(task.training.rows), set(task.validation.rows)
+    assert (len(training), len(validation)) == (16, 4)
+    assert training | validation == set(range(20))
+    other = Task("in", store, replace(TUNING, seed=1), PLANAR)
+    assert set(other.validation.rows) != validation
+    assert validation != set(range(16, 20))
+    for share in (0.01, 0.99):  # of two pushes, one remains on either side
+        few = Task(
+            "in", store.first(2), replace(TUNING, validation_share=share), PLANAR
+        )
+        assert (len(few.training.rows), len(few.validation.rows)) == (1, 1)
+
+
+def test_repeats_are_validated_on_together_or_not_at_all(tmp_path):
+    info = info_of(40, engine="recorded", seed=None, has_repeats=True)
+    repeat = np.random.default_rng(0).permutation(np.repeat(np.arange(8), 5))
+    arrays = end_points_alone(made_up(info)) | {"repeat": repeat}
+    task = Task("in", write(tmp_path / "data", info, arrays), TUNING, PLANAR)
+    assert task.training.info.pushes + task.validation.info.pushes == 40
+    assert not set(task.training.repeats()) & set(task.validation.repeats())
+    assert task.validation.info.pushes in (5, 10)  # 8 of them would cut a kind
+
+
+def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
+    """Its prediction is computed: the store has none, and the card says it all."""
+    values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5, "camera_x_mm": 1.5}
+    write_json(tmp_path / "engine" / "identified.json", {"values": values})
+    words = {"assumed_engine": str(tmp_path / "engine")}
+    out = tmp_path / "out"
+    fit("sain", store, TUNING, out, start_from=str(start / "sain"), **words)
+    card = read_card(out)
+    assert card.inner_engine == "identified"
+    assert card.assumed == beliefs_of(values)
+    model = load_dynamics(str(out)).dynamics
+    assert model.offset == (1.5e-3, 0.0)
+    assert model.dynamics.engine == engine_of_beliefs(card.assumed)
+    fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
+    lost = shutil.copytree(out, tmp_path / "lost")
+    write_json(lost / "card.json", card.to_dict() | {"assumed": None})
+    with pytest.raises(BadCheckpoint, match="assumed is missing"):
+        load_dynamics(str(lost))
+    with pytest.raises(BadCheckpoint, match="inner_engine is 'identified'"):
+        fit("sain", store, TUNING, tmp_path / "no", start_from=str(out))
+    task = Task("sain", store, TUNING, find_assumed_engine(str(tmp_path / "engine")))
+    arrays = store.read(slice(0, 4), task.names)
+    assert "simulated_planar" not in arrays
+    batch = task.to_batch(arrays, 12)
+    engine = engine_of_beliefs(card.assumed)
+    wanted = engine.rollout(batch.scene, batch.initial, batch.controls)
+    np.testing.assert_allclose(
+        batch.simulated, pack_motion(wanted.states), rtol=1e-4, atol=1e-6
+    )
+    moved = np.asarray(batch.initial.pusher_position) - arrays["initial_pusher"]
+    np.testing.assert_allclose(moved, [[1.5e-3, 0]] * 4, atol=1e-7)
+    # What training predicts is what the model does with what was recorded.
+    controls = to_controls(arrays, store.info, slice(12))
+    found = predict(model, batch.scene, to_initial(arrays), controls)
+    local = path_to_frame(
+        pack_motion(found.states), push_frame(batch.scene, batch.initial)
+    )
+    trained = predict_batch(load_network(out)[0], batch)
+    np.testing.assert_allclose(local, trained, rtol=1e-3, atol=2e-5)
+
+
+def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):
+    batch = to_batch(store.read(slice(None)), store.info, simulated="planar")
+    found = loss_weights(batch, TUNING)
+    last = np.asarray(batch.truth - batch.simulated, np.float64)[:, -1]
+    place = np.mean(np.sum(last[..., :2] ** 2, axis=-1))
+    np.testing.assert_allclose(found.position, 1 / place, rtol=1e-4)
+    np.testing.assert_allclose(found.rotation, 1 / np.mean(last[..., 2] ** 2), 1e-4)
+    # No velocity was observed: there is nothing to measure it by.
+    assert (float(found.velocity), float(found.spin)) == (1.0, 1.0)
+
+
+def test_what_cannot_be_gone_on_from_is_refused(store, start, tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(BadCheckpoint, match="model is 'in', this training's is 'sain'"):
+        fit("sain", store, TUNING, out, start_from=str(start / "in"))
+    for name in ("nowhere", "physics"):
+        says = f"--start-from is '{name}'; it must be engine, in, sain, .*folder"
+        with pytest.raises(UnknownName, match=says):
+            fit("in", store, TUNING, out, start_from=name)
+    assert not out.exists()
+
+
+def test_a_network_around_another_engine_is_refused(store, tmp_path):
+    with pytest.raises(BadCheckpoint, match="inner_engine is 'bullet'"):
+        fit("sain", store, TUNING, tmp_path / "out", start_from="sain-bullet")
+
+
+def test_patience_needs_pushes_to_validate_on():
+    with pytest.raises(BadInput, match="--patience is 5"):
+        FitConfig(patience=5)
+    for share in (1.0, 1.5, float("nan")):
+        with pytest.raises(BadInput, match="--validation-share"):
+            FitConfig(validation_share=share)
+
+
+def test_equal_is_not_better(start):
+    network = load_network(start / "in")[0]
+    best = Best.first(network, 0.5)
+    assert best.or_better(network, 0.5, 7) is best
+    assert best.or_better(network, float("nan"), 7) is best
+    assert int(best.or_better(network, 0.4, 7).iteration) == 7
+    assert [best.is_stale(i, 3) for i in (2, 3)] == [False, True]
+    assert not best.is_stale(10_000, 0)

@@ -1,0 +1,276 @@
+"""The training loop on tiny stores: it learns, resumes, and refuses what cannot be."""
+
+import json
+import re
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import numpy as np
+import pytest
+
+from learning.stores import (
+    end_points_alone,
+    info_of,
+    made_up,
+    quiet_store,
+    write,
+)
+from sainet.datasets.batch import to_batch
+from sainet.datasets.schema import simulated_name
+from sainet.learning import fit as fit_module
+from sainet.learning.assumed import find_assumed_engine
+from sainet.learning.batch import predict_batch
+from sainet.learning.config import FitConfig
+from sainet.learning.fit import STATE, fit
+from sainet.learning.log import LOG, append_log, read_log, rewind_log
+from sainet.learning.task import Task, begin
+from sainet.models.card import CARD, WEIGHTS, read_card
+from sainet.models.checkpoint import load_network
+from sainet.models.dynamics import SimulatorAugmented, predict
+from sainet.models.registry import load_dynamics
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, Diverged, RunConflict
+from sainet.runs.manifest import MANIFEST
+from sainet.scenes.state import pack_motion
+
+PLANAR = find_assumed_engine("planar")
+CONFIG = FitConfig(
+    iterations=60,
+    batch_size=8,
+    log_every=5,
+    checkpoint_every=20,
+    validation_share=1 / 6,
+    learning_rate=3e-3,
+)
+
+
+class Stopped(Exception):
+    """What an impatient user raises."""
+
+
+@pytest.fixture(scope="session")
+def store(tmp_path_factory):
+    return quiet_store(tmp_path_factory.getbasetemp())
+
+
+@pytest.fixture(scope="session")
+def trained(store, tmp_path_factory):
+    return fit("sain", store, CONFIG, tmp_path_factory.mktemp("run") / "out")
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def losses(result, name):
+    return np.array([line[name] for line in result.history])
+
+
+def test_training_reduces_the_loss_on_what_it_saw_and_what_it_did_not(trained):
+    for name in ("loss", "validation_loss"):
+        found = losses(trained, name)
+        assert found[-3:].mean() < 0.75 * found[0]
+
+
+def test_a_run_leaves_its_network_its_card_and_its_log(trained, store):
+    files = contents(trained.folder)
+    assert files.keys() == {"config.json", MANIFEST, LOG, WEIGHTS, CARD}
+    card = read_card(trained.folder)
+    assert card.weights == content_hash(files[WEIGHTS])
+    assert (card.kind, card.truth_engine) == ("robot", "planar")
+    assert card.data == store.content
+    assert card.manifest["devices"] == jax.device_count()
+    assert read_log(trained.folder) == trained.history
+    assert [line["iteration"] for line in trained.history] == list(range(5, 61, 5))
+    assert load_dynamics(str(trained.folder)).card == card
+
+
+def test_a_finished_run_is_left_alone(trained, store):
+    before = contents(trained.folder)
+    steps = []
+    count = lambda *step: steps.append(step)  # noqa: E731
+    again = fit("sain", store, CONFIG, trained.folder, on_step=count)
+    assert (steps, again.history) == ([], trained.history)
+    assert contents(trained.folder) == before
+
+
+def test_other_settings_touch_nothing(trained, store):
+    before = contents(trained.folder)
+    for name, changed in (("sain", replace(CONFIG, seed=1)), ("in", CONFIG)):
+        with pytest.raises(RunConflict, match=r"config\.json: (seed|model) is"):
+            fit(name, store, changed, trained.folder)
+    assert contents(trained.folder) == before
+
+
+def test_a_folder_of_somebody_else_is_not_used(store, tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(RunConflict, match="not empty"):
+        fit("in", store, CONFIG, tmp_path)
+    assert contents(tmp_path) == {"thesis.tex": b"years of work"}
+
+
+def test_the_stored_prediction_is_what_the_engine_says_at_prediction(trained, store):
+    made = load_dynamics(str(trained.folder)).dynamics
+    assert isinstance(made, SimulatorAugmented)
+    arrays = store.read(slice(0, 6))
+    batch = to_batch(arrays, store.info, simulated="planar")
+    parts = (batch.scene, batch.initial, batch.controls)
+    s_bar = eqx.filter_jit(made.engine.rollout)(*parts).states
+    stored = arrays[simulated_name("planar")]
+    np.testing.assert_allclose(pack_motion(s_bar), stored, atol=2e-6, rtol=1e-5)
+    # So training and prediction are the same computation, in two frames.
+    network, _ = load_network(trained.folder)
+    local = np.asarray(predict_batch(network, batch))
+    table = np.asarray(pack_motion(predict(made, *parts).states))
+    np.testing.assert_allclose(
+        np.linalg.norm(np.diff(local[..., :2], axis=0), axis=-1),
+        np.linalg.norm(np.diff(table[..., :2], axis=1), axis=-1).swapaxes(0, 1),
+        atol=1e-6,
+    )
+    np.testing.assert_allclose(
+        local[..., 5], table[..., 5].swapaxes(0, 1), atol=1e-4, rtol=1e-3
+    )
+
+
+def test_pushes_with_known_ends_alone_can_be_trained_on(tmp_path):
+    # Of IN: all that its statistics can be of is the stored prediction of an engine.
+    info = info_of(10, bodies=1, engine="recorded", seed=None)
+    lengths = [12] * 7 + [7] * 3
+    store = write(tmp_path / "data", info, end_points_alone(made_up(info, lengths)))
+    config = FitConfig(iterations=8, batch_size=4, log_every=1, steps=12)
+    result = fit("in", store, config, tmp_path / "out")
+    found = losses(result, "loss")
+    assert np.isfinite(found).all()
+    state, weights = begin(Task("in", store, config, PLANAR))
+    after, before = load_network(tmp_path / "out")[0].dyn, state.network.dyn
+    moved = jax.tree.map(lambda a, b: float(abs(a - b).max()), after, before)
+    assert min(jax.tree.leaves(moved)) > 1e-4  # no step was skipped as not finite
+    # What is not known of the truth is s-bar, never a disk at 0 m.
+    arrays = store.read(slice(None))
+    known = np.where(
+        np.isnan(arrays["truth"]), arrays["simulated_planar"], arrays["truth"]
+    )
+    way = (known - arrays["initial"][:, None])[..., :2].astype(float)
+    wanted = 1 / (way**2).sum(-1).mean()
+    assert float(weights.position) == pytest.approx(wanted, rel=1e-3)
+
+
+def never_learns(loss):
+    """A stand-in for `make_step` that costs nothing."""
+    return lambda config, weights, start: lambda state, batch: (state, loss)
+
+
+def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch):
+    task = Task("sain", store, CONFIG, PLANAR)
+    chunk = sum(a.nbytes for a in store.read(slice(0, 8), task.names).values())
+    readers = []
+    reader = fit_module.BatchReader
+
+    def small(*args, **words):
+        readers.append(reader(*args, **words, memory=chunk))
+        return readers[-1]
+
+    monkeypatch.setattr(fit_module, "BatchReader", small)
+    monkeypatch.setattr(fit_module, "make_step", never_learns(1.0))
+    fit("sain", store, replace(CONFIG, validation_share=0.0), tmp_path / "out")
+    (used,) = readers
+    assert used._cache._size <= chunk
+    assert "truth_pusher" not in used.names
+
+
+def started(store, folder, monkeypatch):
+    """A run that was stopped before its first step."""
+
+    def stop(*args, **settings):
+        raise Stopped
+
+    with monkeypatch.context() as patch:
+        patch.setattr(fit_module, "_iterate", stop)
+        with pytest.raises(Stopped):
+            fit("sain", store, CONFIG, folder)
+
+
+@pytest.mark.parametrize("name", ["devices", "processor", "versions"])
+def test_going_on_where_the_bits_would_differ_warns(store, tmp_path, monkeypatch, name):
+    started(store, tmp_path, monkeypatch)
+    started(store, tmp_path, monkeypatch)  # the same machine: no warning
+    found = json.loads((tmp_path / MANIFEST).read_text())
+    del found["versions"]["scipy"]  # older manifests do not name it: no warning
+    (tmp_path / MANIFEST).write_text(json.dumps(found))
+    started(store, tmp_path, monkeypatch)
+    (tmp_path / MANIFEST).write_text(json.dumps(found | {name: "other"}))
+    with pytest.warns(UserWarning, match=f"{name} was other"):
+        started(store, tmp_path, monkeypatch)
+
+
+def test_a_damaged_checkpoint_is_named(store, tmp_path, monkeypatch):
+    started(store, tmp_path, monkeypatch)
+    (tmp_path / STATE).write_bytes(b"half a checkpoi")
+    with pytest.raises(BadInput, match=STATE):
+        fit("sain", store, CONFIG, tmp_path)
+
+
+def test_a_loss_that_is_no_number_stops_the_training(store, tmp_path, monkeypatch):
+    monkeypatch.setattr(fit_module, "make_step", never_learns(float("nan")))
+    with pytest.raises(Diverged, match="--learning-rate"):
+        fit("in", store, CONFIG, tmp_path / "out")
+    assert not (tmp_path / "out" / CARD).exists()
+
+
+def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
+    says = "assumed_engines has no 'bullet'; give --assumed-engine planar, which it has"
+    with pytest.raises(BadStore, match=says):
+        fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
+    assert not (tmp_path / "out").exists()
+
+
+def test_some_pushes_have_to_remain_for_training(store, tmp_path):
+    with pytest.raises(BadInput, match="--validation-share is 0.1.*no two pushes"):
+        fit("sain", store.first(1), CONFIG, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+AT_LEAST_ONE = ("iterations", "batch_size", "halve_every", "steps")
+AT_LEAST_ONE += ("log_every", "checkpoint_every")
+NOT_NEGATIVE = ("l2", "weight_position", "weight_rotation", "weight_velocity")
+NOT_NEGATIVE += ("weight_spin", "validation_share", "patience", "average", "seed")
+BAD = [(name, bad) for name in AT_LEAST_ONE for bad in (0, -3)]
+BAD += [(n, bad) for n in ("learning_rate", "clip_norm") for bad in (0.0, -1.0)]
+BAD += [(name, -1) for name in NOT_NEGATIVE]
+BAD += [
+    (name, bad)
+    for name in ("learning_rate", "clip_norm", "l2", "weight_spin")
+    for bad in (float("nan"), float("inf"))
+]
+
+
+@pytest.mark.parametrize(("name", "value"), BAD)
+def test_settings_that_no_training_can_have_name_their_option(name, value):
+    option = "--" + name.replace("_", "-")
+    with pytest.raises(BadInput, match=f"^{option} is {value}"):
+        FitConfig(**{name: value})
+
+
+def test_a_log_forgets_what_comes_after_the_checkpoint_and_what_was_cut(tmp_path):
+    lines = [{"iteration": i, "loss": 1 / i} for i in (5, 10, 15)]
+    for line in lines:
+        append_log(tmp_path, line)
+    with (tmp_path / LOG).open("a") as file:
+        file.write('{"iteration": 20, "lo')
+    assert read_log(tmp_path) == lines
+    assert rewind_log(tmp_path, 10) == lines[:2]
+    assert read_log(tmp_path) == lines[:2]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"{", b"[]", b'{"loss": 1}', b'{"iteration": 1, "loss": "x"}', b"\xff", b""],
+)
+def test_a_damaged_line_of_a_log_is_named(tmp_path, line):
+    append_log(tmp_path, {"iteration": 5, "loss": 1.0})
+    with (tmp_path / LOG).open("ab") as file:
+        file.write(line + b"\n")
+    says = rf"^{re.escape(str(tmp_path / LOG))}: line 2 is damaged.*run the same"
+    with pytest.raises(BadCheckpoint, match=says):
+        read_log(tmp_path)

@@ -1,0 +1,165 @@
+"""A push made up by hand: two disks that touch, models a little off; and an episode."""
+
+import numpy as np
+
+from sainet.report.replay import Replay, Track
+
+STEPS = 200
+TIME_STEP = 1 / 240  # s
+RADIUS = (0.0525, 0.058)  # m
+PUSHER_RADIUS = 0.0048  # m
+# By how much each model ends off (mm and degrees), and along which way (rad).
+_OFF = {
+    "physics": (3.8, 0.9, 0.6),
+    "physics-calibrated": (0.95, 0.5, -0.8),
+    "in": (0.8, 0.7, 2.0),
+    "sain": (0.35, 0.25, 2.6),
+}
+
+
+def ramp():
+    """Return the share of the motion done at each step, from 0 to 1."""
+    time = np.arange(STEPS + 1) * TIME_STEP
+    lag = 0.06 * np.exp(-(((time - 0.21) / 0.03) ** 2))
+    return np.maximum(np.clip(time / 0.2, 0, 1) - lag, 0)
+
+
+def true_track():
+    share = ramp()
+    heading = np.radians(24) + 0.10 * share
+    step = 0.0104 * share
+    way = np.stack([np.cos(heading), np.sin(heading)], -1)
+    first = step[:, None] * way
+    along = np.radians(-12)
+    apart = sum(RADIUS) * np.array([np.cos(along), np.sin(along)])
+    second = apart + 0.55 * step[:, None] * np.array([np.cos(along), np.sin(along)])
+    back = np.radians(196)
+    pusher = (RADIUS[0] + PUSHER_RADIUS) * np.array([np.cos(back), np.sin(back)])
+    return Track(
+        position=np.stack([first, second], 1),
+        angle=np.stack([0.4 + 0.035 * share, 1.9 - 0.012 * share], 1),
+        pusher=pusher + first,
+    )
+
+
+def replay(title="Push 17 of the test set", models=tuple(_OFF)):
+    truth = true_track()
+    tracks = {"truth": truth}
+    for name in models:
+        size, turn, way = _OFF.get(name, (1.5, 0.4, 1.0))
+        share = ramp()[:, None] ** 1.6
+        bend = way + 0.5 * share
+        off = 1e-3 * size * share * np.concatenate([np.cos(bend), np.sin(bend)], 1)
+        both = np.stack([off, 0.7 * off[:, ::-1]], 1)
+        angle = truth.angle + np.radians(turn) * share * np.array([1.0, -0.6])
+        tracks[name] = Track(truth.position + both, angle, truth.pusher)
+    return Replay(title, TIME_STEP, RADIUS, PUSHER_RADIUS, tracks)
+
+
+def curves(models=tuple(_OFF)):
+    """Return mean errors over time and their bands (mm), by model."""
+    push = replay(models=models)
+    means = {name: push.errors_mm(name)[1:] for name in models}
+    bands = {name: (0.9 * mean, 1.12 * mean) for name, mean in means.items()}
+    return means, bands
+
+
+def histories():
+    rng = np.random.default_rng(0)
+    iteration = np.arange(0, 3000, 20)
+    found = {}
+    for name, floor in (("in", 0.09), ("sain", 0.06)):
+        loss = floor + 2.0 * np.exp(-iteration / 250) + 0.3 * np.exp(-iteration / 1200)
+        noisy = loss * rng.lognormal(0, 0.15, len(loss))
+        found[name] = (iteration, noisy, iteration[::10], 1.07 * loss[::10])
+    return found
+
+
+def row(model, body, scale, group=None):
+    values = {
+        "trans_percent": 1.44 * scale,
+        "pos_mm": 3.6 * scale,
+        "rot_deg": 0.88 * scale**0.5,
+        "final_pos_mm": 4.4 * scale,
+        "final_rot_deg": 1.1 * scale**0.5,
+        "relative_percent": 34.0 * scale,
+    }
+    intervals = {
+        f"{name}_interval": [0.94 * value, 1.07 * value]
+        for name, value in values.items()
+    }
+    head = {"model": model, "body": body, "group": group, "n": 500}
+    return head | values | intervals
+
+
+def result():
+    """Return what ``sainet evaluate --json`` prints, for four models."""
+    scales = {"physics": 1.0, "physics-calibrated": 0.23, "in": 0.21, "sain": 0.165}
+    rows = [
+        row(model, body, scale * (1.0, 0.9)[body - 1])
+        for model, scale in scales.items()
+        for body in (1, 2)
+    ]
+    paper = {"physics": (6.27, 5.81), "in": (5.76, 3.84), "sain": (4.66, 3.47)}
+    published = [
+        {"model": model, "body": body, "group": None, "pos_mm": pair[body - 1]}
+        for model, pair in paper.items()
+        for body in (1, 2)
+    ]
+    comparison = {
+        "model": "sain",
+        "against": "in",
+        "body": 1,
+        "group": None,
+        "metric": "pos_mm",
+        "difference": -0.162,
+        "interval": [-0.21, -0.11],
+    }
+    return {"rows": rows, "published": published, "comparisons": [comparison]}
+
+
+def record(pushes=3, **changes):
+    """Return the record of an episode: straight ahead, 10 mm a push, three samples."""
+    turns = [
+        {
+            "observed": [[10.0 * push, 0.0, 0.0], [10.0 * push + 113, 0.0, 0.0]],
+            "actual": [
+                [[10.0 * push + x, 1.0, 2.0], [10.0 * push + 113 + x, 1.0, 2.0]]
+                for x in (3.0, 6.0, 9.0)
+            ],
+            "planned": [
+                [[10.0 * push + x, 1.0, 2.0], [10.0 * push + 113 + x, 1.0, 2.0]]
+                for x in range(10)
+            ],
+            "pusher": [[10.0 * push + x - 59, 0.0] for x in (3.0, 6.0, 9.0)],
+            "distance_mm": 150.0 - 10 * push,
+        }
+        for push in range(pushes)
+    ]
+    known = {
+        "trial": 0,
+        "model": "sain",
+        "goals": "easy",
+        "turns": turns,
+        "pushes": pushes,
+        "moved": 1,
+        "solved": True,
+        "reason": "solved",
+        "final_mm": 2.34,
+        "final": [[29.0, 1.0, 2.0], [142.0, 1.0, 2.0]],
+        "goal_mm": [150.0, 0.0],
+        "tolerance_mm": 5.9,
+        "radius_mm": [54.0, 59.0],
+        "pusher_radius_mm": 4.8,
+        "table_friction": 0.15,
+        "decision_s": [0.1] * pushes,
+    }
+    return known | changes
+
+
+def lost_record():
+    """Return the record of an episode whose last push left the finite numbers."""
+    lost = record(solved=False, reason="the simulated world left", final_mm=None)
+    lost["turns"][-1]["actual"][1:] = [[[None] * 3] * 2] * 2
+    lost["turns"][-1]["pusher"][1:] = [[None] * 2] * 2
+    return lost | {"final": [[None] * 3] * 2}

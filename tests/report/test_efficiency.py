@@ -1,0 +1,49 @@
+"""The figure of data efficiency."""
+
+from xml.etree import ElementTree
+
+from sainet.report.figures.efficiency import draw_data_efficiency
+from sainet.report.palette import style_of
+
+
+def table(bodies=(1, 2)):
+    errors = {"physics": (4, 4, 4), "in": (6, 1.5, 0.7), "sain": (2, 1, 0.6)}
+    rows = [
+        {
+            "model": model,
+            "body": body,
+            "group": f"{pushes:,}",
+            "pos_mm": error * body,
+            "pos_mm_interval": [0.8 * error * body, 1.2 * error * body],
+            "rot_deg": error / 2,
+            "rot_deg_interval": [0.4 * error, 0.6 * error],
+        }
+        for model, values in errors.items()
+        for error, pushes in zip(values, (50, 500, 4500), strict=True)
+        for body in bodies
+    ]
+    return {"rows": rows}
+
+
+def test_it_holds_every_model_and_the_same_bytes_each_time(tmp_path):
+    one, two = (draw_data_efficiency(table(), tmp_path / f"{n}.svg") for n in "ab")
+    assert one.read_bytes() == two.read_bytes()
+    assert ElementTree.parse(one).getroot().tag.endswith("svg")
+    text = one.read_text()
+    for name in ("physics", "in", "sain"):
+        assert style_of(name).color in text
+        assert f">{style_of(name).label}</text>" in text
+    for pushes in ("50", "500", "4,500"):
+        assert f">{pushes}</text>" in text
+
+
+def test_only_what_learns_has_a_band(tmp_path):
+    text = draw_data_efficiency(table(), tmp_path / "a.svg").read_text()
+    assert text.count('id="FillBetweenPolyCollection') == 2 * 2 * 2
+
+
+def test_one_disk_has_a_panel_of_each_error(tmp_path):
+    text = draw_data_efficiency(table(bodies=(1,)), tmp_path / "a.svg").read_text()
+    assert text.count(">Disk 1</text>") == 2
+    for told in ("position error (mm)", "rotation error (deg)"):
+        assert text.count(f">mean {told}</text>") == 1

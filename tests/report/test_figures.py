@@ -1,0 +1,172 @@
+"""The figures are written whole, are the same each time, and survive odd input."""
+
+import dataclasses
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from report import samples
+from sainet.report.figures.canvas import spread
+from sainet.report.figures.learning import draw_learning_curve, running_mean
+from sainet.report.figures.paths import draw_error_over_time, draw_paths
+from sainet.report.pages.templates import read
+from sainet.report.palette import css_variables, style_of, styles_of
+from sainet.report.replay import Replay, Track
+
+HOSTILE = "<script>alert(1)</script> $x_{"
+
+
+def _errors(path):
+    curves, bands = samples.curves()
+    return draw_error_over_time(curves, path, time_step=samples.TIME_STEP, bands=bands)
+
+
+DRAW = {
+    "paths": lambda path: draw_paths(samples.replay(), path),
+    "errors": _errors,
+    "learning": lambda path: draw_learning_curve(samples.histories(), path),
+}
+
+
+@pytest.mark.parametrize("name", DRAW)
+def test_svg_is_well_formed_and_the_same_bytes_each_time(name, tmp_path):
+    first, second = (DRAW[name](tmp_path / f"{n}.svg") for n in "ab")
+    assert ElementTree.parse(first).getroot().tag.endswith("svg")
+    assert first.read_bytes() == second.read_bytes()
+    assert {path.name for path in tmp_path.iterdir()} == {"a.svg", "b.svg"}
+
+
+def test_png_is_written(tmp_path):
+    path = DRAW["learning"](tmp_path / "new" / "curve.png")
+    assert path.read_bytes().startswith(b"\x89PNG")
+
+
+def test_every_model_has_its_own_colour_in_the_figure(tmp_path):
+    text = DRAW["paths"](tmp_path / "a.svg").read_text()
+    for name in samples.replay().tracks:
+        assert style_of(name).color in text
+
+
+def test_a_failed_drawing_leaves_what_was_there(tmp_path):
+    path = tmp_path / "a.unheard-of"
+    path.write_text("before")
+    with pytest.raises(ValueError, match="unheard-of"):
+        DRAW["paths"](path)
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+    assert path.read_text() == "before"
+
+
+def test_hostile_names_are_text_in_a_figure(tmp_path):
+    path = draw_paths(samples.replay(models=(HOSTILE,)), tmp_path / "a.svg")
+    assert "<script" not in path.read_text()
+    assert "alert" in "".join(ElementTree.parse(path).getroot().itertext())
+
+
+@pytest.mark.parametrize("bodies", [1, 3])
+def test_any_number_of_disks(bodies, tmp_path):
+    push = samples.replay()
+    pick = np.arange(bodies) % 2
+    tracks = {
+        name: Track(track.position[:, pick], track.angle[:, pick], track.pusher)
+        for name, track in push.tracks.items()
+    }
+    push = Replay("p", push.time_step, (0.05,) * bodies, 0.005, tracks)
+    assert draw_paths(push, tmp_path / "a.svg").stat().st_size > 1000
+
+
+def test_what_was_not_observed_or_diverged_is_left_out(tmp_path):
+    push = samples.replay()
+    push.tracks["in"].position[100:] = np.nan
+    text = draw_paths(push, tmp_path / "a.svg").read_text()
+    assert "nan" not in text.lower()
+    curves = {"in": np.full((5, 1), np.nan), "sain": np.ones((5, 1))}
+    text = draw_error_over_time(curves, tmp_path / "b.svg", time_step=0.1).read_text()
+    assert "SAIN" in text
+
+
+def test_a_replay_refuses_tracks_that_do_not_fit():
+    push = samples.replay()
+    with pytest.raises(ValueError, match="2 bodies|1 bodies"):
+        dataclasses.replace(push, radius=(0.05,))
+    # While the tests run, the annotated shapes may be what refuses.
+    with pytest.raises((ValueError, TypeError)):
+        Track(np.zeros((3, 2, 2)), np.zeros((3, 2)), np.zeros((2, 2)))
+
+
+def test_errors_of_a_replay_are_millimetres_and_degrees():
+    push = samples.replay()
+    assert push.errors_mm("physics")[-1] == pytest.approx([3.8, 0.7 * 3.8])
+    assert push.final_turn_deg("physics") == pytest.approx([0.9, 0.54])
+
+
+def test_labels_keep_their_order_and_distance():
+    wanted = np.array([5.0, 0.0, 5.5, 0.2, 20.0])
+    places = spread(wanted, 2.0)
+    assert np.array_equal(np.argsort(places), np.argsort(wanted))
+    assert np.diff(np.sort(places)).min() >= 2.0 - 1e-9
+    assert places[4] == 20.0
+    assert places[[1, 3]].mean() == pytest.approx(0.1)
+
+
+def test_unknown_models_get_colours_of_their_own():
+    styles = styles_of(["sain", "runs/a", "runs/b", "runs/c", "runs/a"])
+    assert len({style.color for style in styles.values()}) == len(styles) == 4
+    assert {style.variable for style in styles.values()} <= css_variables(
+        dark=True
+    ).keys()
+    assert len(style_of("runs/" + 60 * "x").label) <= 40
+
+
+def test_a_network_of_another_form_is_called_after_the_one_that_is_known():
+    label = style_of("sain-bullet-bystander").label
+    assert label == "SAIN around Bullet, bystander"
+    assert style_of("in-single-steps").label == "IN, single steps"
+    for unknown in ("runs/in-bystander", "in-bystanders", "-bystander"):
+        assert style_of(unknown).label == unknown
+
+
+def test_lines_are_told_apart_without_their_colours():
+    others = ("physics-calibrated", "in", "sain-bullet", "sain-calibrated")
+    styles = styles_of([*others, *(f"runs/{number}" for number in range(6))])
+    dashes = {style.dash for style in styles.values()}
+    assert len(dashes) == len(styles) == 10
+    assert () not in dashes  # truth, physics and SAIN
+
+
+def luminance(color):
+    """Of red, green and blue from 0 to 1, as the WCAG has it."""
+    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+    return linear @ (0.2126, 0.7152, 0.0722)
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_faint_text_can_be_read(dark):
+    (percent,) = re.findall(r"--faint: color-mix.*?(\d+)%", read("report.css"))
+    colors = css_variables(dark=dark)
+    ink, paper = (
+        np.array(
+            [int(colors[name][start : start + 2], 16) / 255 for start in (1, 3, 5)]
+        )
+        for name in ("--ink", "--paper")
+    )
+    faint = paper + int(percent) / 100 * (ink - paper)
+    low, high = sorted([luminance(faint), luminance(paper)])
+    assert (high + 0.05) / (low + 0.05) >= 4.5  # AA
+
+
+def test_a_running_mean_is_of_the_losses_around(tmp_path):
+    losses = np.random.default_rng(0).lognormal(size=60)
+    assert running_mean(losses)[30] == pytest.approx(losses[27:33].mean())
+    assert running_mean(losses[:5]).tolist() == losses[:5].tolist()  # too few
+
+
+def test_a_learning_curve_explains_what_it_shows_alone(tmp_path):
+    whole = samples.histories()
+    nothing = np.array([])
+    alone = {name: (*parts[:2], nothing, nothing) for name, parts in whole.items()}
+    empty = {"in": (nothing,) * 4}
+    for histories, told in ((whole, True), (alone, False), (empty, False)):
+        path = draw_learning_curve(histories, tmp_path / "a.svg")
+        assert (">validation<" in path.read_text()) is told

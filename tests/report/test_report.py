@@ -1,0 +1,129 @@
+"""The report is one file, refers to nothing outside, and escapes what it is told."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from report import samples
+from sainet.report.figures.learning import draw_learning_curve
+from sainet.report.figures.paths import draw_paths
+from sainet.report.pages.page import Report, replay_data, to_page, write_report
+
+HOSTILE = "</script><script>alert(1)</script>&\"'"
+
+
+@pytest.fixture
+def report(tmp_path):
+    figures = [
+        (draw_paths(samples.replay(), tmp_path / "a.svg"), "Paths of one push."),
+        (draw_learning_curve(samples.histories(), tmp_path / "b.png"), "Learning."),
+        (draw_paths(samples.replay(), tmp_path / "c.svg").read_text(), "As text."),
+    ]
+    return Report(
+        title="A report",
+        summary="First paragraph.\n\nSecond one.",
+        table=samples.result(),
+        figures=figures,
+        replays=[samples.replay(), samples.replay("Another push", ("sain",))],
+        manifest={"seed": 0, "versions": {"jax": "0.8.0"}, "git_commit": None},
+        commands=["sainet demo --out runs/demo"],
+    )
+
+
+class Page(HTMLParser):
+    """Collects the attributes of a page, its identifiers and its scripts."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.attributes, self.ids, self.scripts, self.inside = [], [], [], False
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.attributes += [(tag, name, value or "") for name, value in attrs]
+        self.ids += [value for name, value in attrs if name == "id"]
+        self.inside = tag == "script"
+        if self.inside:
+            self.scripts.append("")
+
+    def handle_endtag(self, tag):
+        self.inside = False
+
+    def handle_data(self, data):
+        if self.inside:
+            self.scripts[-1] += data
+
+
+def test_one_file_with_everything_in_it(report, tmp_path):
+    path = write_report(report, tmp_path / "out" / "report.html")
+    text = path.read_text("utf-8")
+    assert text.startswith("<!doctype html>")
+    for wanted in ("First paragraph.", "sainet demo --out", "0.8.0", "base64,"):
+        assert wanted in text
+    assert [p.name for p in path.parent.iterdir()] == ["report.html"]
+
+
+def test_no_reference_leaves_the_file(report):
+    text = to_page(report)
+    outside = re.findall(r"https?://(?!www\.w3\.org/)[^\s\"'<]*", text)
+    assert outside == []
+    for _, name, value in Page(text).attributes:
+        if name in ("src", "href", "xlink:href", "action", "srcset"):
+            assert value.startswith(("data:", "#"))
+    assert not re.search(r"@import|url\((?!#)", text)
+
+
+def test_identifiers_are_unique_and_references_resolve(report):
+    page = Page(to_page(report))
+    assert len(page.ids) == len(set(page.ids))
+    text = to_page(report)
+    pointed = re.findall(r"url\(#([^)]+)\)|href=\"#([^\"]+)\"", text)
+    assert pointed
+    assert {first or second for first, second in pointed} <= set(page.ids)
+    labels = [value for _, name, value in page.attributes if name == "aria-labelledby"]
+    assert set(labels) <= set(page.ids)
+
+
+def test_the_replay_data_come_through_unchanged(report):
+    scripts = Page(to_page(report)).scripts
+    assert json.loads(scripts[0]) == replay_data(samples.replay())
+    track = json.loads(scripts[0])["tracks"][1]["bodies"][1]
+    truth = samples.replay().tracks["physics"]
+    assert track["x"] == pytest.approx(1e3 * truth.position[:, 1, 0], abs=6e-4)
+    assert track["angle"] == pytest.approx(truth.angle[:, 1], abs=6e-6)
+
+
+def test_hostile_text_is_escaped_everywhere():
+    result = samples.result()
+    result["rows"][0] |= {"model": HOSTILE, "group": HOSTILE}
+    report = Report(
+        title=HOSTILE,
+        subtitle=HOSTILE,
+        summary=HOSTILE,
+        table=result,
+        figures=[("<svg></svg>", HOSTILE)],
+        replays=[samples.replay(HOSTILE, (HOSTILE,))],
+        manifest={HOSTILE: HOSTILE},
+        commands=[HOSTILE],
+    )
+    text = to_page(report)
+    assert "<script>alert" not in text
+    scripts = Page(text).scripts
+    assert len(scripts) == 2  # the data of the replay and the player
+    assert json.loads(scripts[0])["title"] == HOSTILE
+
+
+def test_what_is_not_a_number_becomes_null():
+    push = samples.replay()
+    push.tracks["in"].position[3] = np.nan
+    data = json.loads(json.dumps(replay_data(push), allow_nan=False))
+    assert data["tracks"][3]["bodies"][0]["x"][2:4][1] is None
+
+
+def test_a_report_may_be_nearly_empty(tmp_path):
+    path = write_report(Report(title="Nothing yet"), tmp_path / "report.html")
+    text = path.read_text()
+    assert "<script" not in text
+    assert "How this was made" in text

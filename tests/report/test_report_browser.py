@@ -1,0 +1,208 @@
+"""The replay in a real browser: it plays, pauses, scrubs, toggles, and never logs."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from selenium import webdriver
+
+from report import samples
+from sainet.report.figures.paths import draw_paths
+from sainet.report.pages.page import Report, write_report
+
+pytestmark = pytest.mark.browser
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--window-size=1200,1000",
+)
+
+
+@contextmanager
+def opened(chromium, folder, *flags) -> Iterator:
+    """Open the report; at the end nothing may have been logged as an error."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = str(chromium.browser)
+    for flag in (*FLAGS, f"--user-data-dir={folder / 'profile'}", *flags):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    service = webdriver.ChromeService(executable_path=str(chromium.driver))
+    driver = webdriver.Chrome(options=options, service=service)
+    try:
+        driver.get((folder / "report.html").as_uri())
+        yield driver
+        logged = driver.get_log("browser")
+        assert [entry for entry in logged if entry["level"] == "SEVERE"] == []
+    finally:
+        driver.quit()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    figure = draw_paths(samples.replay(), tmp_path / "paths.svg")
+    report = Report(
+        title="A report",
+        table=samples.result(),
+        figures=[(figure, "Paths of one push.")],
+        replays=[samples.replay()],
+        episodes=[
+            samples.record(),
+            samples.record(pushes=0),
+            samples.lost_record(),
+        ],
+    )
+    write_report(report, tmp_path / "report.html")
+    return tmp_path
+
+
+@pytest.fixture
+def still(chromium, folder):
+    """The report as someone sees it who wants no motion."""
+    with opened(chromium, folder, "--force-prefers-reduced-motion") as driver:
+        yield driver
+
+
+def element(driver, name, block="replay-0"):
+    return driver.find_element("id", f"{block}-{name}")
+
+
+def milliseconds(driver):
+    return int(element(driver, "time").text.removesuffix(" ms"))
+
+
+def pixels(driver, name="canvas", block="replay-0"):
+    return driver.execute_script(
+        "return document.getElementById(arguments[0]).toDataURL()", f"{block}-{name}"
+    )
+
+
+def is_playing(driver):
+    return element(driver, "play").get_attribute("aria-pressed") == "true"
+
+
+def wait_until(condition, seconds=10.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.05)
+
+
+def scrub_to(driver, step, block="replay-0"):
+    driver.execute_script(
+        "arguments[0].value = arguments[1];"
+        "arguments[0].dispatchEvent(new Event('input', { bubbles: true }));",
+        element(driver, "scrub", block),
+        step,
+    )
+
+
+def test_plays_pauses_and_does_not_start_where_motion_is_unwelcome(still):
+    time.sleep(0.3)
+    assert milliseconds(still) == 0
+    assert not is_playing(still)
+    element(still, "play").click()
+    wait_until(lambda: milliseconds(still) > 20)
+    element(still, "play").click()
+    assert not is_playing(still)
+    paused = milliseconds(still)
+    time.sleep(0.3)
+    assert milliseconds(still) == paused
+
+
+def test_scrubbing_moves_the_disks_and_the_read_out(still):
+    start, lens = pixels(still), pixels(still, "lens-1")
+    scrub_to(still, samples.STEPS)
+    assert milliseconds(still) == round(1000 * samples.STEPS * samples.TIME_STEP)
+    assert pixels(still) != start
+    assert pixels(still, "lens-1") != lens
+    row = still.find_element("css selector", "#replay-0 [data-model='1']")
+    assert row.text.split() == ["Physics", "3.80", "mm", "2.66", "mm"]
+
+
+def test_a_model_can_be_hidden_and_shown_again(still):
+    scrub_to(still, 150)
+    shown = pixels(still)
+    element(still, "show-1").click()
+    assert pixels(still) != shown
+    element(still, "show-1").click()
+    assert pixels(still) == shown
+
+
+def test_differences_can_be_exaggerated_without_changing_the_errors(still):
+    scrub_to(still, 150)
+    shown = pixels(still)
+    table = still.find_element("css selector", ".readout").text
+    still.find_element("css selector", "#replay-0-zoom input[value='20']").click()
+    assert pixels(still) != shown
+    assert still.find_element("css selector", ".readout").text == table
+
+
+def test_keys_play_step_and_jump(still):
+    canvas = element(still, "canvas")
+    canvas.send_keys("\ue014")  # arrow right
+    assert milliseconds(still) == 4
+    canvas.send_keys("\ue010")  # end
+    assert milliseconds(still) == 833
+    canvas.send_keys("\ue011")  # home
+    assert milliseconds(still) == 0
+    canvas.send_keys(" ")
+    wait_until(lambda: milliseconds(still) > 0)
+    assert is_playing(still)
+
+
+def test_it_starts_over_at_the_end(still):
+    still.find_element("css selector", "#replay-0-speed input[value='1']").click()
+    scrub_to(still, 190)
+    element(still, "play").click()
+    wait_until(lambda: milliseconds(still) < 700)
+    assert is_playing(still)
+
+
+def test_an_episode_is_told_push_by_push(still):
+    block = "episode-0"
+    status = element(still, "status", block)
+    assert status.text == "push 1 of 3: disk 2 is 150.0 mm from its goal"
+    scene, chart = (pixels(still, name, block) for name in ("canvas", "chart"))
+    scrub_to(still, 5, block)
+    assert status.text == "push 2 of 3: disk 2 is 140.0 mm from its goal"
+    assert pixels(still, "canvas", block) != scene
+    assert pixels(still, "chart", block) != chart
+    scrub_to(still, 11, block)
+    assert status.text == "solved with 3 pushes: disk 2 is 2.3 mm from its goal"
+    assert milliseconds(still) == 0  # the other player is left alone
+
+
+def test_an_episode_plays_to_its_end_and_one_without_a_push_stands_still(still):
+    element(still, "play", "episode-0").click()
+    status = element(still, "status", "episode-0")
+    wait_until(lambda: status.text.startswith("solved"))
+    scrub_to(still, 0, "episode-1")
+    ended = element(still, "status", "episode-1").text
+    assert ended == "solved with 0 pushes: disk 2 is 2.3 mm from its goal"
+    scrub_to(still, 11, "episode-2")
+    lost = element(still, "status", "episode-2").text
+    assert lost == "the simulated world left after 3 pushes: disk 2 is nowhere"
+
+
+def test_nothing_is_wider_than_a_phone(still):
+    size = {"width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": True}
+    still.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    wide = still.execute_script("return document.documentElement.scrollWidth")
+    assert wide == 390
+
+
+def test_starts_by_itself_once_it_is_seen(chromium, folder):
+    with opened(chromium, folder) as driver:
+        driver.execute_script("arguments[0].scrollIntoView()", element(driver, "play"))
+        driver.execute_script(
+            "arguments[0].scrollIntoView({ block: 'center' })",
+            element(driver, "canvas"),
+        )
+        wait_until(lambda: milliseconds(driver) > 20)

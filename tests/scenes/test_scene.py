@@ -1,0 +1,105 @@
+"""Scenes, states and trajectories."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from contracts.worlds import make_scene, moving
+from sainet.runs.errors import BadScene
+from sainet.scenes.scene import check_scene
+from sainet.scenes.shapes import pair_gaps, pusher_gaps
+from sainet.scenes.state import (
+    Trajectory,
+    at_rest,
+    check_state,
+    pack_motion,
+    unpack_motion,
+)
+
+SCENE = make_scene([[1.0, 2.0, 3.0]], [[0.05, 0.06, 0.07]])
+STATE = moving(
+    [[[0.0, 0.0], [0.2, 0.0], [0.0, -0.1]]], np.full((1, 3, 2), 0.1), [[1.0, 2.0, 3.0]]
+)
+
+
+def with_value(tree, name, value):
+    return eqx.tree_at(lambda t: getattr(t, name), tree, value)
+
+
+def test_counts_and_batches():
+    assert SCENE.body_count == STATE.body_count == 3
+    assert SCENE.batch_shape == (1,)
+
+
+def test_gaps_are_between_surfaces():
+    gaps = np.asarray(pair_gaps(SCENE, STATE))[0]
+    assert np.isinf(np.diag(gaps)).all()
+    np.testing.assert_allclose(gaps, gaps.T)
+    assert gaps[0, 1] == pytest.approx(0.2 - 0.11, abs=1e-7)
+    assert gaps[0, 2] == pytest.approx(0.1 - 0.12, abs=1e-7)
+    near = with_value(STATE, "pusher_position", jnp.array([[-0.1, 0.0]]))
+    found = np.asarray(pusher_gaps(SCENE, near))[0]
+    assert found[0] == pytest.approx(0.1 - 0.05 - 0.0048, abs=1e-7)
+    assert found[1] == pytest.approx(0.3 - 0.06 - 0.0048, abs=1e-7)
+
+
+def test_packed_motion_unpacks_to_the_same_state():
+    packed = pack_motion(STATE)
+    assert packed.shape == (1, 3, 6)
+    np.testing.assert_allclose(packed[0, 1], [0.2, 0, 0, 0.1, 0.1, 2], rtol=1e-6)
+    again = unpack_motion(packed, STATE.pusher_position, STATE.pusher_velocity)
+    assert eqx.tree_equal(again, STATE)
+
+
+def test_at_rest_nothing_moves():
+    state = at_rest(STATE.position, STATE.angle, STATE.pusher_position)
+    assert not np.asarray(state.velocity).any()
+    assert not np.asarray(state.spin).any()
+    assert not np.asarray(state.pusher_velocity).any()
+
+
+def test_trajectories_know_their_end_and_their_bad_steps():
+    packed = jnp.stack([pack_motion(STATE) * t for t in (1.0, 2.0, 3.0)], axis=1)
+    path = jnp.zeros((1, 3, 2))
+    trajectory = Trajectory(unpack_motion(packed, path, path))
+    np.testing.assert_array_equal(trajectory.final.position, 3 * STATE.position)
+    np.testing.assert_array_equal(trajectory.final.spin, 3 * STATE.spin)
+    assert trajectory.is_finite.all()
+    for column in range(6):
+        broken = packed.at[0, 1, 2, column].set(jnp.nan)
+        found = Trajectory(unpack_motion(broken, path, path)).is_finite
+        np.testing.assert_array_equal(found, [[True, False, True]])
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0, 0.0])
+@pytest.mark.parametrize("name", ["mass", "radius", "pusher_radius"])
+def test_properties_must_be_positive(name, value):
+    values = getattr(SCENE, name)
+    scene = with_value(SCENE, name, values.at[(0,) * values.ndim].set(value))
+    with pytest.raises(BadScene, match=f"^x.csv: {name} is .*; it must be positive"):
+        check_scene(scene, "x.csv")
+
+
+@pytest.mark.parametrize("name", ["table_friction", "disk_friction", "pusher_friction"])
+def test_frictions_must_not_be_negative(name):
+    check_scene(with_value(SCENE, name, jnp.zeros(1)))
+    for value in (-0.1, np.nan, np.inf):
+        with pytest.raises(BadScene, match=f"{name} is .* zero or positive"):
+            check_scene(with_value(SCENE, name, jnp.full(1, value)))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("position", "angle", "velocity", "spin"),
+        *("pusher_position", "pusher_velocity"),
+    ],
+)
+def test_states_must_be_finite(name, value):
+    check_state(STATE)
+    values = getattr(STATE, name)
+    state = with_value(STATE, name, values.at[(0,) * values.ndim].set(value))
+    with pytest.raises(BadScene, match=f"row 3: {name} holds NaN"):
+        check_state(state, "row 3")

@@ -1,0 +1,120 @@
+"""The demo from its first push to its report, which opens and plays in a browser."""
+
+import html
+import json
+import subprocess
+import sys
+
+import pytest
+from selenium.webdriver.support.ui import WebDriverWait
+
+from report.test_report_browser import element, milliseconds, opened
+from sainet.cli.output import Output
+from sainet.cli.reproduce import Reproduce
+from sainet.runs.errors import BadInput, MissingExtra, UnknownName
+from sainet.studies import EXPERIMENTS, load_experiment
+from sainet.studies.published import ROBOT_TWO_DISKS, published_rows
+from support import SOURCE
+
+TINY = ("--pushes", "100", "--test-pushes", "6", "--iterations", "2")
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    out = tmp_path_factory.mktemp("demo") / "demo"
+    command = [sys.executable, "-m", "sainet", "demo", *TINY, "--out", str(out)]
+    done = subprocess.run(
+        [*command, "--json", "--quiet"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return out, json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_the_demo_compares_four_models_on_both_disks(demo):
+    out, result = demo
+    rows = {(row["model"], row["body"]) for row in result["rows"]}
+    models = ("physics", "physics-calibrated", "in", "sain")
+    assert rows == {(model, body) for model in models for body in (1, 2)}
+    assert all(row["n"] == 6 for row in result["rows"])
+    told = "100 pushes for 2 iterations of the paper's 10,000"
+    assert told in html.unescape((out / "report.html").read_text())
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_report_of_the_demo_plays(demo, chromium):
+    out, _ = demo
+    with opened(chromium, out, "--force-prefers-reduced-motion") as driver:
+        before = milliseconds(driver)
+        element(driver, "play").click()
+        WebDriverWait(driver, 20).until(lambda page: milliseconds(page) > before)
+        for block, goals in enumerate(("easy", "hard")):
+            title = element(driver, "title", f"episode-{block}").text
+            assert title.startswith(f"SAIN, {goals} goal 1: solved with ")
+
+
+def test_an_unknown_experiment_lists_the_known():
+    with pytest.raises(UnknownName, match="robot-planar"):
+        load_experiment("table-9")
+    assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
+
+
+@pytest.fixture
+def begun(monkeypatch):
+    """The folders of the experiments that were begun; those below do nothing."""
+    folders = []
+    for name in ("robot_planar", "fine_tuning"):
+        monkeypatch.setattr(
+            f"sainet.studies.{name}.run",
+            lambda scale, chain: folders.append(chain.out.name) or {"rows": []},
+        )
+    monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
+    return folders
+
+
+@pytest.mark.parametrize(
+    ("second", "error", "says"),
+    [
+        ("table-9", UnknownName, "table-9"),
+        ("recorded-pushes", BadInput, "--recorded is missing"),
+        ("engine-parity", MissingExtra, "PyBullet"),
+    ],
+)
+def test_what_cannot_be_made_is_said_before_anything_runs(
+    second, error, says, begun, monkeypatch
+):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    with pytest.raises(error, match=says):
+        Reproduce(experiments=("robot-planar", second)).run()
+    assert begun == []
+
+
+def test_all_that_can_be_made_is_told_even_when_quiet(begun, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    Reproduce(output=Output(quiet=True)).run()
+    assert begun == ["robot-planar-quick", "fine-tuning-quick"]
+    recorded, bullet = capsys.readouterr().err.splitlines()
+    told = "recorded-pushes, recorded-data-efficiency."
+    assert recorded == f"Left out without --recorded: {told}"
+    assert bullet.startswith("Left out without PyBullet: direct-force-two-disks, ")
+
+
+def test_several_trainings_at_once_are_refused_on_one_gpu(begun, monkeypatch):
+    monkeypatch.setattr("jax.default_backend", lambda: "gpu")
+    with pytest.raises(BadInput, match="--trainers is 2; on a GPU it must be 1"):
+        Reproduce(experiments=("robot-planar",), trainers=2).run()
+    assert begun == []
+    Reproduce(experiments=("robot-planar",)).run()
+    assert begun == ["robot-planar-quick"]
+
+
+def test_the_help_names_every_experiment():
+    source = (SOURCE / "cli" / "reproduce.py").read_text("utf-8")
+    assert all(name in source for name in EXPERIMENTS)
+
+
+def test_published_rows_are_the_papers():
+    rows = published_rows(ROBOT_TWO_DISKS)
+    sain = next(r for r in rows if r["model"] == "sain" and r["body"] == 2)
+    assert (sain["pos_mm"], sain["rot_deg"], sain["trans_percent"]) == (3.47, 0.21, 1.5)

@@ -1,0 +1,126 @@
+"""The experiments with Bullet, tiny: their rows, what they share and leave alone."""
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from sainet.datasets.store import open_store
+from sainet.runs.documents import read_json
+from sainet.studies.data_efficiency import IN_FULL, again
+from sainet.studies.paper_setup import AROUND, BYSTANDER, NETWORKS
+from sainet.studies.published import DIRECT_FORCE_THREE_DISKS, published_rows
+from sainet.studies.regularisation import score
+from sainet.studies.robustness import push_angles
+from support import require
+
+pytestmark = pytest.mark.slow
+PHYSICS = {"physics", "physics-calibrated"}
+
+
+@pytest.fixture(autouse=True)
+def bullet():
+    require(find_spec("pybullet"), "PyBullet is not installed")
+
+
+def cards(folder):
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("card.json")}
+
+
+def rows_of(table):
+    return {(row["group"], row["model"], row["body"]) for row in table["rows"]}
+
+
+def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
+    two = make("direct-force-two-disks")
+    made = cards(tmp_path)
+    three = make("direct-force-three-disks")
+    assert len(made) == len(NETWORKS)
+    after = cards(tmp_path)
+    assert {path: after[path] for path in made} == made
+    beside = {f"sain-{BYSTANDER}"}
+    added = {path.parent.name for path in after.keys() - made.keys()}
+    assert added == {f"{name}-seed-0" for name in beside}
+    for disks, table, more in (
+        (2, two, set()),
+        (3, three, beside),
+        (2, three["as_trained"], beside),
+    ):
+        models, bodies = PHYSICS | set(NETWORKS) | more, range(1, disks + 1)
+        assert rows_of(table) == {(None, m, b) for m in models for b in bodies}
+        assert all(row["n"] == 4 for row in table["rows"])
+    old, new = (
+        read_json(tmp_path / "direct-force-quick" / f"{name}-seed-0" / "card.json")
+        for name in ("sain", *beside)
+    )
+    assert new["started_from"] == old["weights"]
+    assert new["inner_engine"] == old["inner_engine"]
+    assert three["published"] == published_rows(DIRECT_FORCE_THREE_DISKS)
+    kept = read_json(tmp_path / "direct-force-three-disks" / "table.json")
+    assert kept["rows"] == three["rows"]
+    made_by = read_json(tmp_path / "direct-force-three-disks" / "config.json")
+    assert made_by["experiment"] == "direct-force-three-disks"
+    versions = read_json(tmp_path / "direct-force-three-disks" / "manifest.json")
+    assert versions["versions"]["jax"]
+    engines = {
+        read_json(path)["model"] + " " + str(read_json(path)["inner_engine"])
+        for path in made
+    }
+    assert engines == {"in None", *(f"sain {engine}" for engine in AROUND.values())}
+
+
+def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
+    models = PHYSICS | {"in"}
+    efficiency = make("data-efficiency")
+    assert rows_of(efficiency) == {
+        (group, m, b)
+        for group in ("3", "6", again(), IN_FULL)
+        for m in models
+        for b in (1, 2)
+    }
+    assert (tmp_path / "data-efficiency" / "data-efficiency.svg").is_file()
+    both = models | {"in-single-steps"}
+    assert rows_of(make("recurrent-or-not")) == {
+        (None, m, b) for m in both for b in (1, 2)
+    }
+    found = make("regularisation")
+    assert [choice["l2"] for choice in found["choices"]] == [1e-4, 1e-6]
+    assert all(np.isfinite(choice["score"]) for choice in found["choices"])
+    robust = make("robustness")
+    groups = {row["group"] for row in robust["rows"]}
+    assert len(groups) == 8
+    assert groups >= {"as trained", "properties ±10 %", "angles outside", "2 mm apart"}
+    forms = ("", "-3-pushes", "-6-pushes", "-single-steps", "-l2-0.0001")
+    made = {path.parent.name for path in cards(tmp_path)}
+    assert made == {f"in{form}-seed-0" for form in forms} | {"in-6-pushes-seed-1"}
+    check_test_sets(tmp_path / "robot-quick")
+
+
+def check_test_sets(folder):
+    usual = open_store(folder / "test-2-disks").read(slice(None))
+    wrong = open_store(folder / "test-properties-5-percent").read(slice(None))
+    for name in ("mass", "radius"):
+        off = np.abs(wrong[name] / usual[name] - 1)
+        np.testing.assert_allclose(off, 0.05, atol=1e-5)
+    np.testing.assert_array_equal(wrong["truth"], usual["truth"])
+    contact, heading = push_angles(usual)
+    assert contact.max() <= np.pi / 3
+    assert heading.max() <= np.pi / 6 + 1e-5
+    contact, heading = push_angles(
+        open_store(folder / "test-outside-angles").read(slice(None))
+    )
+    assert ((contact > np.pi / 3) | (heading > np.pi / 6)).all()
+
+
+def test_the_score_is_the_mean_error_over_that_of_physics():
+    def row(model, pos, rot):
+        return {"model": model, "pos_mm": pos, "rot_deg": rot}
+
+    table = {
+        "rows": [
+            *(row("physics", 4.0, 1.0), row("physics", 2.0, 2.0)),
+            *(row("in", 1.0, 0.5), row("in", 1.0, 1.0)),
+            *(row("sain", 2.0, 0.5), row("sain", 0.5, 1.0)),
+        ]
+    }
+    assert score(table) == pytest.approx((0.25 + 0.5 + 0.5 + 0.25 + 4 * 0.5) / 8)

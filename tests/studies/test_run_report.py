@@ -1,0 +1,122 @@
+"""The report of a run folder, whatever made it, and however damaged it is."""
+
+import json
+import shutil
+
+import pytest
+
+from report import samples
+from sainet.control.trials import FOLDER
+from sainet.models.registry import PRETRAINED
+from sainet.report.figures.learning import draw_learning_curve
+from sainet.report.figures.paths import draw_paths
+from sainet.runs.documents import write_json
+from sainet.runs.errors import BadInput
+from sainet.studies.run_report import TABLE, page_of, report_of
+from studies.test_simulated_control import result as control_table
+
+
+def test_a_training_is_its_card_and_its_curve(tmp_path):
+    folder = tmp_path / "net"
+    shutil.copytree(PRETRAINED / "sain", folder)
+    draw_learning_curve(samples.histories(), folder / "learning-curve.svg")
+    page = page_of(folder)
+    assert "The loss while the network learned." in page
+    assert page.count("<svg") == 1
+    for told in ("truth engine", "bullet", "learning rate", "0.001", "data seed"):
+        assert told in page
+
+
+def test_errors_episodes_and_figures_come_together(tmp_path):
+    write_json(tmp_path / "config.json", {"command": "control", "seed": 3})
+    write_json(tmp_path / TABLE, samples.result())
+    for trial in range(8):
+        write_json(tmp_path / FOLDER / f"{trial:03d}.json", samples.record(trial=trial))
+    (tmp_path / FOLDER / "008.interrupted.json").write_text("cut sho")
+    draw_paths(samples.replay(), tmp_path / "paths.svg")
+    (tmp_path / "of-somebody.svg").write_text("<svg onload='alert(1)'/>")
+    report = report_of(tmp_path)
+    assert len(report.episodes) == 6
+    assert "'sainet control' left" in report.subtitle
+    page = page_of(tmp_path)
+    assert "Prediction errors" in page
+    assert "alert" not in page
+
+
+def test_goals_are_a_table_of_their_own(tmp_path):
+    table = control_table()
+    table["rows"][0]["group"] = "<b>easy</b>"
+    write_json(tmp_path / TABLE, table)
+    page = page_of(tmp_path)
+    assert "Goals reached" in page
+    assert "&lt;b&gt;easy&lt;/b&gt;" in page
+    assert "<b>easy" not in page
+    assert "McNemar" in page
+
+
+def test_what_was_identified_is_said(tmp_path):
+    known = {"name": "pusher_friction", "value": 0.31, "low": 0.3, "high": 0.32}
+    estimates = [
+        {**known, "start": 0.25, "doubt": None},
+        {**known, "name": "spin", "start": 0.25, "doubt": "it never spins"},
+    ]
+    errors = {"before_mm": 2, "after_mm": 1, "before_deg": 5, "after_deg": 4}
+    found = {"estimates": estimates, "pushes": 12, **errors}
+    write_json(tmp_path / "identified.json", found)
+    page = page_of(tmp_path)
+    assert "Pusher friction: 0.31 [0.3, 0.32], 0.25 before." in page
+    assert "The data cannot tell spin: it never spins." in page
+    assert "Mean errors of 12 pushes: position 2.00 mm before" in page
+
+
+def test_what_hides_beside_a_figure_is_left_out(tmp_path):
+    hidden = "<!-- <svg onload='alert(1)'> -->"
+    doctype = "<!DOCTYPE svg [<!ENTITY a \"<svg onload='alert(2)'>\">]>"
+    labelled = samples.replay(models=("me@home url(x)",))
+    drawn = draw_paths(labelled, tmp_path / "paths.svg")
+    body = drawn.read_text()
+    body = body[body.index("<svg") :]
+    drawn.write_text(f"{doctype}{hidden}{body}")
+    page = page_of(tmp_path)
+    assert "alert" not in page
+    assert "me@home url(x)" in page  # a label is text
+    assert page.count("<svg") == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        (None, None, "nothing to show"),
+        ("table.json", '{"rows": 3}', "damaged"),
+        ("table.json", '{"rows": [{"success": 1}]}', "damaged"),
+        ("table.json", "[]", "must hold a JSON object"),
+        ("identified.json", '{"estimates": [{}]}', "damaged"),
+        ("card.json", "{}", "format_version"),
+        ("episodes/000.json", "{}", "it is no episode"),
+        ("paths.svg", "<svg><script>alert(1)</script></svg>", "<script> is nothing"),
+        ("paths.svg", "<svg><g onclick='alert(1)'/></svg>", "<g> is nothing"),
+        ("paths.svg", "<svg><g ONCLICK='alert(1)'/></svg>", "<g> is nothing"),
+        ("paths.svg", "<svg ONLOAD='alert(1)'/>", "<svg> is nothing"),
+        ("paths.svg", "<svg><use href='https://x.org/a'/></svg>", "<use> is nothing"),
+        ("paths.svg", "<svg><use HREF='https://x.org/a'/></svg>", "<use> is nothing"),
+        ("paths.svg", "<svg><g style='fill: URL(//x.org)'/></svg>", "<g> is nothing"),
+        ("paths.svg", "<svg><style>@import '//x.org'</style></svg>", "<style> is no"),
+        ("paths.svg", "<svg>", "cannot be read as a figure"),
+    ],
+)
+def test_what_is_hostile_or_damaged_is_named(name, text, told, tmp_path):
+    if name is not None:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    with pytest.raises(BadInput, match=told) as error:
+        page_of(tmp_path)
+    assert str(tmp_path) in str(error.value)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_folder_of_folders_names_one(tmp_path):
+    write_json(tmp_path / "robot-planar-quick" / TABLE, json.loads("{}"))
+    with pytest.raises(BadInput, match="robot-planar-quick, say"):
+        report_of(tmp_path)
+    with pytest.raises(BadInput, match="no such folder"):
+        report_of(tmp_path / "nowhere")

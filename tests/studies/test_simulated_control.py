@@ -1,0 +1,95 @@
+"""The control table, tiny: every model on the same goals, each episode once."""
+
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from sainet.report.control_table import control_markdown, is_control, print_control
+from sainet.runs.documents import read_json
+from sainet.studies import simulated_control
+from sainet.studies.simulated_control import Group, groups
+
+
+def test_the_trials_are_those_of_the_paper_and_more():
+    found = {group.name: group.config for group in groups(100)}
+    assert all(config.world == "bullet" for config in found.values())
+    sizes = [config.trials for config in found.values()]
+    assert sizes == [100] * 4 + [50] * 2
+    assert found["hard, tree, nominal properties"].knows == "nominal"
+    assert found["easy, tree, three disks"].disks == 3
+    assert len({tuple(vars(config).items()) for config in found.values()}) == 6
+
+
+@pytest.mark.slow
+def test_models_push_to_the_same_goals(make, tmp_path, monkeypatch):
+    (usual, *_) = groups(2)
+    small = replace(usual.config, world="planar", pushes=1)
+    monkeypatch.setattr(
+        simulated_control, "groups", lambda trials: [Group("easy, greedy", small)]
+    )
+    monkeypatch.setattr(simulated_control, "MODELS", ("physics", "physics-calibrated"))
+    table = make("simulated-control")
+    assert [row["model"] for row in table["rows"]] == ["physics", "physics-calibrated"]
+    assert [row["trials"] for row in table["rows"]] == [2, 2]
+    pairs = {pair["measure"]: pair for pair in table["pairs"]}
+    assert tuple(pairs) == ("solved", "within_4_mm", "within_25_pushes")
+    for pair in pairs.values():
+        assert (pair["only_one"], pair["only_other"], pair["p"]) == (0, 0, 1.0)
+    goals = [
+        read_json(path)["goal_mm"] for path in sorted(tmp_path.rglob("episodes/*.json"))
+    ]
+    assert goals[:2] == goals[2:]
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("0*.json")}
+    make("simulated-control")
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+def result():
+    row = {
+        "group": "hard, tree",
+        "trials": 100,
+        "solved": 98,
+        "success": 0.98,
+        "interval": [0.93, 0.994],
+        "median_pushes": 24.5,
+        "within_25_pushes": 0.61,
+        "within_4_mm": 0.5,
+        "median_decision_s": 0.4149,
+        "ended_early": 1,
+    }
+    none = {"solved": 0, "success": 0.0, "median_pushes": None, "ended_early": 0}
+    rows = [row | {"model": "sain"}, row | none | {"model": "in"}]
+    pair = {"group": "hard, tree", "model": "sain", "against": "in"}
+    counts = {"only_one": 6, "only_other": 1, "p": 0.125}
+    pairs = [
+        pair | counts | {"measure": "solved"},
+        pair | counts | {"measure": "within_4_mm"},
+        pair | counts | {"measure": "within_25_pushes", "p": 0.031},
+    ]
+    theirs = {"group": "hard, greedy", "model": "in", "trials": 25, "success": 0.88}
+    return {"rows": rows, "pairs": pairs, "published": [theirs]}
+
+
+def test_the_table_says_everything_once():
+    console = Console(record=True, width=140, file=None)
+    with console.capture() as capture:
+        print_control(result(), console)
+    text = capture.get()
+    for part in ("98/100", "93%–99%", "24.5", "61%", "0.415", "22/25", "published"):  # noqa: RUF001
+        assert part in text
+    told = "SAIN alone 6, IN alone 1 (exact McNemar p = "
+    assert f"hard, tree, solved: {told}0.12)" in text
+    assert f"hard, tree, within 25 pushes: {told}0.031)" in text
+    assert "within 4 mm: " not in text  # may be chance
+    assert "SAIN: 1 of 2 not solved ended as the disk was seen there" in text
+    assert "IN: " not in text.replace("SAIN: ", "")
+    lines = control_markdown(result()).splitlines()
+    assert {line.count("|") for line in lines if line.startswith("|")} == {9}
+    assert "| hard, tree | IN | 0/100 |" in lines[3]
+
+
+def test_error_tables_are_no_control_tables():
+    assert is_control(result())
+    assert not is_control({"rows": [{"model": "in", "pos_mm": 1.0}]})
+    assert not is_control({"rows": []})
