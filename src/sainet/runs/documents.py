@@ -5,16 +5,22 @@ import hashlib
 import json
 import math
 import os
+import stat
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
 
 from sainet.runs.errors import BadInput
 
 
 FORMAT_VERSION = 1
+LARGEST_DOCUMENT = 64 << 20  # bytes
+_LONGEST_REASON = 200  # characters of a message that quote a file
+T = TypeVar("T")
 
 
 def to_json(value: object) -> str:
@@ -109,3 +115,64 @@ def is_number(value: object) -> bool:
         return math.isfinite(value)
     except OverflowError:  # an integer of hundreds of digits
         return False
+
+
+def read_file(
+    path: Path, *, most: int = LARGEST_DOCUMENT, error: type[BadInput] = BadInput
+) -> bytes:
+    """Read a regular file up to a stated size; devices and pipes are refused.
+
+    Args:
+        path: of the file.
+        most: bytes that it may have.
+        error: to raise.
+
+    Raises:
+        BadInput: or the given subclass, when the file is missing, unreadable, too large
+            or no regular file.
+    """
+    try:
+        # Not blocking: to open a pipe would wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        with open(descriptor, "rb") as file:
+            found = os.fstat(descriptor)
+            if not stat.S_ISREG(found.st_mode):
+                raise error(f"{path}: not a regular file; give a file.")
+            if found.st_size > most:
+                raise error(
+                    f"{path}: {found.st_size} bytes; at most {most} are read."
+                )
+            return file.read(most)
+    except FileNotFoundError:
+        raise error(f"{path}: no such file.") from None
+    except (OSError, ValueError) as cause:
+        reason = getattr(cause, "strerror", None) or cause
+        raise error(f"{path}: cannot be read ({reason}).") from None
+
+
+def read_document(
+    path: Path, kind: type[T], *, error: type[BadInput] = BadInput, remedy: str = ""
+) -> T:
+    """Read a JSON document into a msgspec struct; every field is checked.
+
+    Args:
+        path: of the file.
+        kind: the struct.
+        error: to raise.
+        remedy: what the user can do, without a full stop: "train it again".
+
+    Raises:
+        BadInput: or the given subclass, in one line with file, field and remedy.
+    """
+    try:
+        return msgspec.json.decode(read_file(path, error=error), type=kind)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
+        reason = " ".join(str(cause).split())[:_LONGEST_REASON]
+        advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
+        raise error(f"{path}: {reason}.{advice}") from None
+
+
+def write_document(path: Path, document: msgspec.Struct) -> None:
+    """Write a struct as JSON: sorted keys, so that equal documents are equal bytes."""
+    # By way of builtins: msgspec would write NaN as null.
+    write_json(path, msgspec.to_builtins(document, order="sorted"))

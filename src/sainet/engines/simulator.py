@@ -1,0 +1,127 @@
+"""Simulator specifications: which engine predicts, and what it assumes of a scene.
+
+A specification is data: it is stored in cards, datasets and identified parameters, and
+two equal specifications make the same prediction. `build` returns the engine. Free of
+JAX until then.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import msgspec
+
+from sainet.runs.documents import content_hash
+from sainet.runs.errors import UnknownName
+from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
+
+if TYPE_CHECKING:
+    from sainet.engines.assumed import AssumedProperties
+
+UNIFORM_PRESSURE = (
+    2 / 3
+)  # mean distance of the pressure from the centre over the radius
+_DIGEST = 8  # characters that tell specifications without a name apart
+
+
+class Assumptions(msgspec.Struct, frozen=True, kw_only=True):
+    """Properties that an engine assumes; None keeps the scene's own value.
+
+    A disk beyond the listed ones gets the mean of the listed values.
+    """
+
+    mass: tuple[Mass, ...] | None = None  # kg
+    radius: tuple[Radius, ...] | None = None  # m
+    table_friction: Friction | None = None  # between disks and table
+    disk_friction: Friction | None = None  # between disks
+    pusher_friction: Friction | None = None  # between pusher and disk
+
+
+# The paper's properties (section IV-B), and the same with true masses and radii.
+PAPER = Assumptions(mass=(0.896, 1.1), radius=(0.0525, 0.058), table_friction=0.15)
+TRUE_PROPERTIES = Assumptions(table_friction=0.15)
+
+
+class _Spec(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
+    """What the specifications of all engines have in common."""
+
+    assumptions: Assumptions = PAPER
+    version: int = 1  # of the engine's equations: other versions predict otherwise
+
+    engine: ClassVar[str]
+
+    @property
+    def slug(self) -> str:
+        """The name in options and stored arrays, unique for each specification."""
+        for name, spec in SIMULATORS.items():
+            if spec == self:
+                return name
+        return f"{self.engine}-{content_hash(msgspec.json.encode(self))[:_DIGEST]}"
+
+    @property
+    def is_identified(self) -> bool:
+        """Whether parameters were estimated from pushes."""
+        return self not in SIMULATORS.values()
+
+
+class PlanarSpec(_Spec, frozen=True, kw_only=True, tag="planar"):
+    """The planar engine."""
+
+    pressure_radius_ratio: PressureRatio = UNIFORM_PRESSURE
+
+    engine: ClassVar[str] = "planar"
+
+    def build(self) -> "AssumedProperties":
+        """Return the engine with its assumptions."""
+        from sainet.engines.assumed import AssumedProperties
+        from sainet.engines.planar.engine import PlanarEngine
+
+        engine = PlanarEngine(pressure_radius_ratio=self.pressure_radius_ratio)
+        return AssumedProperties(engine, **_properties(self.assumptions))
+
+
+class BulletSpec(_Spec, frozen=True, kw_only=True, tag="bullet"):
+    """Bullet (extra `bullet`)."""
+
+    engine: ClassVar[str] = "bullet"
+
+    def build(self) -> "AssumedProperties":
+        """Return the engine with its assumptions.
+
+        Raises:
+            MissingExtra: PyBullet is not installed.
+        """
+        from sainet.engines.assumed import AssumedProperties
+        from sainet.engines.bullet.engine import BulletEngine
+
+        return AssumedProperties(BulletEngine(), **_properties(self.assumptions))
+
+
+SimulatorSpec = PlanarSpec | BulletSpec
+
+# Specifications by the names that options take and that stored arrays have.
+SIMULATORS: Mapping[str, SimulatorSpec] = MappingProxyType(
+    {
+        "planar": PlanarSpec(),
+        "planar-true": PlanarSpec(assumptions=TRUE_PROPERTIES),
+        "bullet": BulletSpec(),
+        "bullet-true": BulletSpec(assumptions=TRUE_PROPERTIES),
+    }
+)
+
+
+def simulator_named(name: str) -> SimulatorSpec:
+    """Return the specification with a name.
+
+    Raises:
+        UnknownName: there is none.
+    """
+    if name not in SIMULATORS:
+        known = ", ".join(SIMULATORS)
+        raise UnknownName(f"No simulator named {name!r}. Available: {known}.")
+    return SIMULATORS[name]
+
+
+def _properties(assumptions: Assumptions) -> dict[str, Any]:
+    known = msgspec.structs.asdict(assumptions)
+    return {"friction": known.pop("table_friction"), **known}

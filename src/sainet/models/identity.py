@@ -1,0 +1,78 @@
+"""Model identities: what a model is, from which its name and its label are computed."""
+
+from typing import Literal
+
+import msgspec
+
+from sainet.engines.simulator import PAPER, TRUE_PROPERTIES, SimulatorSpec
+
+Kind = Literal["physics", "in", "sain", "gp", "published"]
+# Pushes that a network was trained on: the paper's simulated pushes; simulated strokes;
+# "simulation" is a stroke network used as it is, "tuned" one fine-tuned on recorded
+# pushes; "residual" an additive network and "real" a new one, recorded pushes only.
+TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
+Features = Literal["paper", "place"]
+Variant = Literal["", "bystander", "single-steps", "for-all"]
+
+_KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
+_VARIANTS = {"single-steps": "single steps", "for-all": "all surfaces"}
+
+
+class ModelId(msgspec.Struct, frozen=True, kw_only=True):
+    """The identity of a model: equal identities name the same kind of model.
+
+    `slug` is its name in commands, tables and JSON, `label` its name for readers. Both
+    are computed from the fields and never taken apart again.
+    """
+
+    kind: Kind
+    simulator: SimulatorSpec | None = None  # the engine, or a network's internal engine
+    data: TrainingData = "paper"
+    features: Features = "paper"
+    variant: Variant = ""
+    name: str = ""  # given by a user or publication; replaces the computed names
+
+    @property
+    def slug(self) -> str:
+        """The name in commands, tables and JSON."""
+        return self.name or "-".join(filter(None, [self.kind, *self._parts()]))
+
+    @property
+    def label(self) -> str:
+        """The name for readers."""
+        if self.name:
+            return self.name
+        label = _KINDS[self.kind] + self._engine_label()
+        words = filter(None, self._parts()[1:])
+        return ", ".join([label, *(_VARIANTS.get(word, word) for word in words)])
+
+    def _parts(self) -> list[str]:
+        """Return the parts of the slug after the kind, empty where usual."""
+        return [
+            self._simulator_part(),
+            "" if self.data == "paper" else self.data,
+            "" if self.features == "paper" else self.features,
+            self.variant,
+        ]
+
+    def _simulator_part(self) -> str:
+        if self.simulator is None or self.kind == "in":
+            return ""
+        if self.simulator.assumptions == TRUE_PROPERTIES:
+            return "true"
+        if self.simulator.assumptions != PAPER:
+            return "identified"
+        # Physics is named for what it assumes, not for its engine.
+        is_usual = self.kind == "physics" or self.simulator.engine == "planar"
+        return "" if is_usual else self.simulator.engine
+
+    def _engine_label(self) -> str:
+        return _SIMULATOR_PARTS.get(self._simulator_part(), "")
+
+
+_SIMULATOR_PARTS = {
+    "": "",
+    "true": ", true properties",
+    "identified": ", identified",
+    "bullet": " around Bullet",
+}

@@ -1,0 +1,102 @@
+"""Bounds on physical values: the one place where they are stated.
+
+Stores, cards, identified parameters, properties files, options and Python arguments all
+check against these bounds. `Mass` and the other annotated types carry the bounds into
+msgspec documents; `Quantity.check` applies them to numbers and arrays. Free of JAX.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from sainet.runs.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A physical quantity and the range that its values may have."""
+
+    name: str
+    unit: str  # empty: without a dimension
+    low: float
+    high: float
+    mistaken_for: str = ""  # the unit that values above the range are usually in
+
+    @property
+    def wanted(self) -> str:
+        """The range in words: "from 0.001 to 100 kg"."""
+        return f"from {self.low:g} to {self.high:g} {self.unit}".rstrip()
+
+    @property
+    def meta(self) -> msgspec.Meta:
+        """The range as msgspec checks it when it decodes (JSON holds no NaN)."""
+        return msgspec.Meta(ge=self.low, le=self.high)
+
+    def accepts(self, values: object) -> bool:
+        """Return whether a number, or every number of an array, is in the range."""
+        return self._first_outside(values) is None
+
+    def check(
+        self,
+        values: object,
+        where: str,
+        *,
+        error: type[BadInput] = BadInput,
+        remedy: str = "",
+    ) -> None:
+        """Raise an error unless all values are in the range.
+
+        Args:
+            values: a number or an array.
+            where: file and field, or the argument, as the message is to name it.
+            error: to raise.
+            remedy: what the user can do, without a full stop.
+
+        Raises:
+            BadInput: or the given subclass, with the value, its range and the remedy.
+        """
+        value = self._first_outside(values)
+        if value is None:
+            return
+        looks = self.mistaken_for and value > self.high
+        hint = f" (in {self.mistaken_for}?)" if looks else ""
+        raise error(
+            f"{where} is {value:g}{hint}; it must be {self.wanted}"
+            + (f"; {remedy}." if remedy else ".")
+        )
+
+    def _first_outside(self, values: object) -> float | None:
+        numbers = np.asarray(values, np.float64)
+        bad = ~((numbers >= self.low) & (numbers <= self.high))  # NaN as well
+        return float(numbers[bad].flat[0]) if bad.any() else None
+
+
+MASS = Quantity("mass", "kg", 1e-3, 100.0, "grams")
+RADIUS = Quantity("radius", "m", 1e-3, 1.0, "millimetres")
+PUSHER_RADIUS = Quantity("pusher radius", "m", 1e-4, 1.0, "millimetres")
+FRICTION = Quantity("friction", "", 0.0, 10.0)
+PRESSURE_RATIO = Quantity("pressure radius ratio", "", 0.01, 1.0)
+CAMERA_OFFSET = Quantity("camera offset", "mm", -100.0, 100.0)
+POSITION = Quantity("position", "m", -100.0, 100.0, "millimetres")
+ANGLE = Quantity("angle", "rad", -1e4, 1e4)
+VELOCITY = Quantity("velocity", "m/s", -100.0, 100.0, "mm/s")
+SPIN = Quantity("spin", "rad/s", -1e4, 1e4)
+FORCE = Quantity("force", "N", -1e4, 1e4)
+PUSHER_MASS = Quantity("pusher mass", "kg", 1e-3, 1e4, "grams")
+DAMPING = Quantity("damping", "N s/m", 0.0, 1e6)
+STROKE = Quantity("stroke", "m", 1e-4, 1.0, "millimetres")
+SPEED = Quantity("speed", "m/s", 1e-4, 10.0, "mm/s")
+TIME_STEP_RANGE = Quantity("time step", "s", 1e-5, 0.1, "milliseconds")
+
+Mass = Annotated[float, MASS.meta]  # kg
+Radius = Annotated[float, RADIUS.meta]  # m
+Friction = Annotated[float, FRICTION.meta]
+PressureRatio = Annotated[float, PRESSURE_RATIO.meta]
+OffsetMm = Annotated[float, CAMERA_OFFSET.meta]  # mm
+TimeStep = Annotated[float, TIME_STEP_RANGE.meta]  # s
+
+MOST_DISKS = 100  # of a scene
+MOST_PUSHES = 10_000_000  # of a dataset
+MOST_STEPS = 100_000  # of a push
