@@ -1,5 +1,7 @@
 """The closed loop, with robots that do odd things and a planner that costs nothing."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -12,9 +14,10 @@ from sainet.control.episode import Episode, checked, distances, run_episode
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.base import AbstractPlanner, Found, Plan
 from sainet.planning.greedy import GreedyPlanner
-from sainet.robots.base import AbstractRobot, Recording
+from sainet.robots.base import AbstractRobot
 from sainet.runs.errors import BadScene
-from sainet.scenes.pushes import PushGrid
+from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.recording import Recording
 
 TASK = goal_ahead(0.05)
 MODEL = PhysicsDynamics(Glide())
@@ -35,10 +38,21 @@ class Ahead(AbstractPlanner):
         return Plan((push,), np.zeros((1, 2, 3)), 0.0, 0.0, 1)
 
 
+def recorded(push: Push, value: float = 0.0, trouble: str = "") -> Recording:
+    """A recording of two samples in which nothing moves."""
+    return Recording(
+        time=np.arange(2.0),
+        pose=np.full((2, 2, 3), value),
+        pusher=np.zeros((2, 2)),
+        commanded=push,
+        trouble=trouble,
+    )
+
+
 class Rail(AbstractRobot):
     """Disk 2 moves straight to the goal, so much with each push."""
 
-    def __init__(self, step=0.01, trouble=None, stops_after=None):
+    def __init__(self, step=0.01, trouble="", stops_after=None):
         self.state, self.step, self.trouble = touching(), step, trouble
         self.left = stops_after
 
@@ -54,7 +68,7 @@ class Rail(AbstractRobot):
         way = way / jnp.linalg.norm(way) * self.step
         moved = self.state.position.at[1].add(way)
         self.state = eqx.tree_at(lambda s: s.position, self.state, moved)
-        return Recording(push, np.zeros((1, 2, 3)), np.zeros((1, 2)), self.trouble)
+        return recorded(push, trouble=self.trouble)
 
 
 def run(robot, **settings):
@@ -100,18 +114,26 @@ class Contrary(Rail):
         return super().push(other)
 
 
-def test_a_robot_that_pushes_otherwise_is_found_out():
+def test_an_executed_push_that_differs_from_the_planned_push_is_trouble():
     episode = run(Contrary(step=0.001))
-    assert episode.reason.startswith("the robot pushed otherwise: its direction is off")
+    assert episode.reason.startswith(
+        "executed push differs from the planned push: its direction"
+    )
     assert len(episode.turns) == 3
 
 
-def test_a_recording_that_is_no_number_is_trouble():
+def test_a_recording_with_nan_is_trouble():
     push = jax.tree.map(lambda x: x[0], PushGrid().pushes())
-    blind = Recording(push, np.full((1, 2, 3), np.nan), np.zeros((1, 2)))
-    assert checked(blind, push).trouble == "the recording holds NaN or infinity"
-    whole = Recording(push, np.zeros((1, 2, 3)), np.zeros((1, 2)))
+    blind = checked(recorded(push, np.nan), push)
+    assert blind.trouble == "the recording contains NaN or infinity"
+    whole = recorded(push)
     assert checked(whole, push) is whole
+
+
+def test_a_recording_without_a_commanded_push_counts_as_executed_as_planned():
+    push = jax.tree.map(lambda x: x[0], PushGrid().pushes())
+    unknown = replace(recorded(push), commanded=None)
+    assert checked(unknown, push) is unknown
 
 
 def test_a_goal_out_of_reach_is_named_as_the_reason():

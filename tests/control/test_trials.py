@@ -19,11 +19,11 @@ from sainet.control.config import ControlConfig
 from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trial import make_trial
 from sainet.control.trials import episode_file, run_trials
-from sainet.robots.base import Recording
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs.documents import read_json, write_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs.folders import CONFIG as CONFIG_FILE
+from sainet.scenes.recording import Recording
 from support import REPOSITORY
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
@@ -91,8 +91,9 @@ def test_a_damaged_episode_is_named_with_the_way_out(tmp_path, done, text, says)
 def test_an_episode_that_leaves_the_finite_numbers_is_recorded(tmp_path, monkeypatch):
     def diverge(self, push):
         self.truth = jax.tree.map(lambda x: x * np.nan, self.truth)
-        lost = np.full((PUSH_STEPS, 2, 3), np.nan, np.float32)
-        return Recording(push, lost, lost[:, 0, :2])
+        lost = np.full((PUSH_STEPS + 1, 2, 3), np.nan, np.float32)
+        time = np.arange(PUSH_STEPS + 1.0)
+        return Recording(time=time, pose=lost, pusher=lost[:, 0, :2], commanded=push)
 
     monkeypatch.setattr(SimulatedRobot, "push", diverge)
     config = replace(CONFIG, trials=1)

@@ -30,9 +30,11 @@ def test_without_noise_a_push_ends_where_the_engine_says():
     batch = jax.tree.map(lambda x: x[None], (scene(), seen, PUSH))
     wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch).states
     position = np.asarray(wanted.position[0])
-    np.testing.assert_allclose(found.path[:80, :, :2], position, atol=1e-5)
-    np.testing.assert_allclose(made.truth.position, found.path[-1, :, :2])
-    assert found.trouble is None
+    np.testing.assert_allclose(found.pose[1:81, :, :2], position, atol=1e-5)
+    np.testing.assert_allclose(made.truth.position, found.pose[-1, :, :2])
+    np.testing.assert_array_equal(found.pose[0, :, :2], touching().position)
+    np.testing.assert_allclose(np.diff(found.time), 1 / 240)
+    assert (found.commanded, found.trouble) == (PUSH, "")
     assert not np.asarray(made.observe().velocity).any()
 
 
@@ -48,7 +50,7 @@ def test_the_same_seed_is_the_same_world():
     def end(seed):
         made = robot(NoiseConfig(), seed)
         made.observe()
-        return made.push(PUSH).path[-1]
+        return made.push(PUSH).pose[-1]
 
     np.testing.assert_array_equal(end(3), end(3))
     assert np.abs(end(3) - end(4)).max() > 1e-5

@@ -9,16 +9,17 @@ from jaxtyping import Float
 
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Plan
-from sainet.robots.base import AbstractRobot, Recording
+from sainet.robots.base import AbstractRobot
 from sainet.runs.errors import BadScene, Diverged
 from sainet.scenes.pushes import Push
+from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
 SOLVED = "solved"  # why most episodes end
 _MOST_TROUBLES = 3  # in a row
-# How far a push may be from the one that was asked for.
+# Largest differences between an executed push and the planned push.
 _TOLERANCES = (
     ("contact_angle", np.deg2rad(5), "rad"),
     ("direction", np.deg2rad(5), "rad"),
@@ -95,23 +96,23 @@ def run_episode(
             return _end(episode, f"{turn.recording.trouble}, {troubles} times in a row")
 
 
-def checked(recording: Recording, asked: Push) -> Recording:
-    """Return a recording that says so if it is not of the push that was asked for.
+def checked(recording: Recording, planned: Push) -> Recording:
+    """Return the recording, with a trouble if its push differs from the planned push.
 
-    The model predicted another push: what it says of the next one may be as wrong.
+    The model predicted another push: its next prediction may be as wrong.
     """
     if recording.trouble:
         return recording
-    if not np.isfinite(recording.path).all():
-        return replace(recording, trouble="the recording holds NaN or infinity")
+    if not np.isfinite(recording.pose).all():
+        return replace(recording, trouble="the recording contains NaN or infinity")
+    executed = recording.commanded or planned
     for name, tolerance, unit in _TOLERANCES:
-        off = abs(float(getattr(recording.push, name)) - float(getattr(asked, name)))
+        off = abs(float(getattr(executed, name)) - float(getattr(planned, name)))
         if off > tolerance:
-            named = name.replace("_", " ")
             return replace(
                 recording,
-                trouble=f"the robot pushed otherwise: its {named} is off by "
-                f"{off:.3g} {unit}",
+                trouble="executed push differs from the planned push: its "
+                f"{name.replace('_', ' ')} is off by {off:.3g} {unit}",
             )
     return recording
 

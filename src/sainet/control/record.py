@@ -65,7 +65,8 @@ def read_record(path: Path) -> dict[str, Any]:
 
 
 def _turn(trial: Trial, turn: Turn) -> dict[str, Any]:
-    push, plan = turn.recording.push, turn.plan
+    recording, plan = turn.recording, turn.plan
+    push = recording.commanded or plan.pushes[0]
     return {
         "contact_angle_deg": _degrees(push.contact_angle),
         "direction_deg": _degrees(push.direction),
@@ -79,9 +80,9 @@ def _turn(trial: Trial, turn: Turn) -> dict[str, Any]:
         "looked_at": plan.looked_at,
         "is_complete": plan.is_complete,
         "warnings": list(plan.warnings),
-        "actual": _poses(turn.recording.path[_EVERY - 1 :: _EVERY]),
-        "pusher": _mm(turn.recording.pusher[_EVERY - 1 :: _EVERY]),
-        "trouble": turn.recording.trouble,
+        "actual": _poses(recording.pose[_EVERY::_EVERY]),
+        "pusher": _mm(recording.pusher[_EVERY::_EVERY]),
+        "trouble": recording.trouble or None,
     }
 
 

@@ -6,11 +6,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from sainet.engines.base import AbstractEngine, roll_out
-from sainet.robots.base import AbstractRobot, Recording
+from sainet.robots.base import AbstractRobot
 from sainet.scenes.controls import PathControls, path_controls
 from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.recording import Recording
 from sainet.scenes.scene import FrictionField, Scene
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, at_rest
@@ -73,13 +75,18 @@ class SimulatedRobot(AbstractRobot):
         )
         initial = at_rest(truth.position, truth.angle, start)
         states = roll_out(self._engine, scene, initial, self._disturb(controls)).states
-        states = jax.tree.map(lambda x: x[0], states)
-        path = np.concatenate([states.position, states.angle[..., None]], axis=-1)
-        before, end = self.truth, jax.tree.map(lambda x: x[-1], states)
+        end = jax.tree.map(lambda x: x[0, -1], states)
         self.truth = at_rest(end.position, end.angle, end.pusher_position)
-        pusher = np.asarray(states.pusher_position)
-        trouble = _start_trouble(plain, initial) or _trouble(before, path)
-        return Recording(push, path, pusher, trouble)
+        before, after = jax.tree.map(lambda x: np.asarray(x)[0], (initial, states))
+        pose = np.concatenate([_pose(before)[None], _pose(after)])
+        path = [before.pusher_position[None], after.pusher_position]
+        return Recording(
+            time=scene.time_step * np.arange(len(pose)),
+            pose=pose,
+            pusher=np.concatenate(path),
+            commanded=push,
+            trouble=_start_trouble(plain, initial) or _trouble(pose),
+        )
 
     def _disturb(self, controls: PathControls) -> PathControls:
         moving = np.abs(np.asarray(controls.velocity)).max(axis=-1) > 0
@@ -91,24 +98,28 @@ class SimulatedRobot(AbstractRobot):
 
 
 _STILL = 1e-4  # m
-_DEEPEST = 1e-3  # m, more than sight is wrong by
+_DEEPEST = 1e-3  # m, more than the noise of motion capture
 
 
-def _start_trouble(scene: Scene, initial: State) -> str | None:
-    """Say if the pusher began inside a disk that it was not to push."""
+def _pose(state: State) -> Float[np.ndarray, "*batch body 3"]:
+    return np.concatenate([state.position, state.angle[..., None]], axis=-1)
+
+
+def _start_trouble(scene: Scene, initial: State) -> str:
+    """Return whether the pusher starts inside another disk than the pushed one."""
     depth = -np.asarray(pusher_gaps(scene, initial))[0, 1:]
     if not (depth > _DEEPEST).any():
-        return None
+        return ""
     disk = 2 + int(np.argmax(depth))
     return f"the pusher began {1000 * depth.max():.1f} mm inside disk {disk}"
 
 
-def _trouble(before: State, path: np.ndarray) -> str | None:
-    """Say if the push was none."""
-    if not np.isfinite(path).all():
-        return "the simulated world left the finite numbers"
-    moved = np.linalg.norm(path[-1, :, :2] - before.position, axis=-1)
-    return None if moved[0] > _STILL else "disk 1 did not move"
+def _trouble(pose: Float[np.ndarray, "sample body 3"]) -> str:
+    """Return why a push that was executed is useless, empty if it is not."""
+    if not np.isfinite(pose).all():
+        return "simulation produced NaN or infinity"
+    moved = np.linalg.norm(pose[-1, 0, :2] - pose[0, 0, :2])
+    return "" if moved > _STILL else "disk 1 did not move"
 
 
 def _with_rough_table(
