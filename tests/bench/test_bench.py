@@ -208,7 +208,7 @@ def test_an_unknown_case_names_those_there_are():
 
 @pytest.mark.parametrize("name", CASES)
 def test_a_case_without_runs_is_bad_input(name):
-    with pytest.raises(BadInput, match="--runs is 0"):
+    with pytest.raises(BadInput, match="`runs` is 0"):
         load_case(name)(0)
 
 

@@ -273,7 +273,7 @@ def test_a_network_for_other_controls_is_refused(tmp_path):
     ],
 )
 def test_bad_settings_name_their_option(name, value):
-    with pytest.raises(BadInput, match=f"^--{name} is {value}"):
+    with pytest.raises(BadInput, match=f"^`{name}` is {value}"):
         ControlConfig(**{name: value})
 
 

@@ -176,7 +176,7 @@ def test_no_room_in_a_later_chunk_is_found_before_any_work(tmp_path):
 )
 def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines):
     require(find_spec("pybullet"), "PyBullet is not installed")
-    with pytest.raises(BadInput, match="--disks is 31; it must be at most 30 with"):
+    with pytest.raises(BadInput, match="`disks` is 31; it must be at most 30 with"):
         generate(GenerateConfig(disks=31, pushes=1, **engines), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

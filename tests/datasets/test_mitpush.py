@@ -301,7 +301,7 @@ def test_bad_input_leaves_nothing_behind(small: Path, tmp_path: Path):
 def test_a_friction_that_cannot_be_is_refused(
     small: Path, tmp_path: Path, value: float
 ):
-    with pytest.raises(BadInput, match="--contact-friction is"):
+    with pytest.raises(BadInput, match="`contact_friction` is"):
         import_endpoints(small, tmp_path / "out", contact_friction=value)
     with pytest.raises(BadInput, match="^table_friction is"):
         import_endpoints(small, tmp_path / "out", table_friction=value)

@@ -367,6 +367,6 @@ def test_what_killed_imports_left_is_removed_and_what_lives_is_not(tmp_path: Pat
 
 def test_a_friction_that_cannot_be_is_refused(tmp_path: Path):
     path = pack(tmp_path / "ellip1_json.zip", good())
-    with pytest.raises(BadInput, match="--contact-friction is"):
+    with pytest.raises(BadInput, match="`contact_friction` is"):
         import_mitpush(path, tmp_path / "out", contact_friction=-1)
     assert not (tmp_path / "out").exists()

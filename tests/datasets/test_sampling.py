@@ -75,14 +75,14 @@ def test_a_gap_parts_the_disks():
 
 
 def test_disks_without_room_are_refused():
-    with pytest.raises(BadInput, match="--disks 3: no room .* widen --placement-deg"):
+    with pytest.raises(BadInput, match="`disks` is 3: .* increase `placement_deg`"):
         drawn(disks=3, placement_deg=5.0, pushes=1)
 
 
 def test_a_pusher_without_room_is_refused(monkeypatch):
     inside = np.full((1, 3), -1e-3)
     monkeypatch.setattr("sainet.datasets.sampling._pusher_gaps", lambda *_: inside)
-    with pytest.raises(BadInput, match="--disks 3: no room was found for the pusher"):
+    with pytest.raises(BadInput, match="`disks` is 3: the pusher could not be placed"):
         drawn(disks=3, pushes=1)
 
 

@@ -278,7 +278,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path):
             import_table(path, bodies, tmp_path / "out")
     with pytest.raises(BadTable, match="cannot be read"):
         import_table(table, tmp_path / "no.toml", tmp_path / "out")
-    with pytest.raises(BadInput, match="--contact-friction is -1"):
+    with pytest.raises(BadInput, match="`contact_friction` is -1"):
         import_table(table, bodies, tmp_path / "out", contact_friction=-1)
     assert not (tmp_path / "out").exists()
 

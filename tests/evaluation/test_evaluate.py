@@ -196,7 +196,7 @@ def test_a_network_is_not_used_on_other_pushes_unless_forced(simulated):
 
 def test_recorded_pushes_of_the_training_are_no_test(recorded):
     card = replace(CARD, data=recorded.content)
-    with pytest.raises(BadCheckpoint, match=r"was trained on them.*--force"):
+    with pytest.raises(BadCheckpoint, match=r"was trained on them.*`force`"):
         evaluate([resting(card=card)], recorded)
     evaluate([resting(card=card)], recorded.first(PUSHES - 1))
 
@@ -244,5 +244,5 @@ def test_two_models_of_one_name_are_refused(simulated):
 
 @pytest.mark.parametrize("steps", [-1, 13])
 def test_steps_that_the_pushes_do_not_have_are_refused(simulated, steps):
-    with pytest.raises(BadInput, match=f"--steps is {steps}; .* has 12"):
+    with pytest.raises(BadInput, match=f"`steps` is {steps}; .* has 12"):
         evaluate([resting()], simulated, steps=steps)

@@ -94,7 +94,7 @@ def test_a_network_learns_to_see_the_place(store, start, tmp_path):
     assert network.sizes.place
     known = load_network(start / "in")[0].sizes.body
     assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
-    with pytest.raises(BadCheckpoint, match="give --features place, too"):
+    with pytest.raises(BadCheckpoint, match="give `features` place, too"):
         fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
 
 
@@ -275,10 +275,10 @@ def test_a_network_around_another_engine_is_refused(store, tmp_path):
 
 
 def test_patience_needs_pushes_to_validate_on():
-    with pytest.raises(BadInput, match="--patience is 5"):
+    with pytest.raises(BadInput, match="`patience` is 5"):
         FitConfig(patience=5)
     for share in (1.0, 1.5, float("nan")):
-        with pytest.raises(BadInput, match="--validation-share"):
+        with pytest.raises(BadInput, match="`validation_share`"):
             FitConfig(validation_share=share)
 
 

@@ -213,7 +213,7 @@ def test_a_damaged_checkpoint_is_named(store, tmp_path, monkeypatch):
 
 def test_a_loss_that_is_no_number_stops_the_training(store, tmp_path, monkeypatch):
     monkeypatch.setattr(fit_module, "make_step", never_learns(float("nan")))
-    with pytest.raises(Diverged, match="--learning-rate"):
+    with pytest.raises(Diverged, match="`learning_rate`"):
         fit("in", store, CONFIG, tmp_path / "out")
     assert not (tmp_path / "out" / CARD).exists()
 
@@ -226,7 +226,7 @@ def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
 
 
 def test_some_pushes_have_to_remain_for_training(store, tmp_path):
-    with pytest.raises(BadInput, match="--validation-share is 0.1.*no two pushes"):
+    with pytest.raises(BadInput, match="`validation_share` is 0.1.*no two pushes"):
         fit("sain", store.first(1), CONFIG, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -124,5 +124,5 @@ def test_what_a_residual_network_says_is_measured_by_the_engines_error(residual)
 
 
 def test_a_hold_of_nothing_is_refused():
-    with pytest.raises(BadInput, match="--hold is 0"):
+    with pytest.raises(BadInput, match="`hold` is 0"):
         FitConfig(hold=0)

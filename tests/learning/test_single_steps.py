@@ -140,7 +140,7 @@ def test_what_cannot_be_cut_is_refused(store, tmp_path):
         write(tmp_path / "recorded", recorded, made_up(recorded)),
         generate(pushed, tmp_path / "force"),
     ):
-        with pytest.raises(BadStore, match=f"{data.path}: --no-recurrent"):
+        with pytest.raises(BadStore, match=f"{data.path}: single steps"):
             fit("sain", data, CONFIG, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -154,7 +154,7 @@ def around_bullet(tmp_path_factory):
 
 
 def test_bullet_cannot_restart_in_a_training(around_bullet, tmp_path):
-    with pytest.raises(BadInput, match="--assumed-engine bullet"):
+    with pytest.raises(BadInput, match="`assumed_engine` bullet"):
         fit("sain", around_bullet, CONFIG, tmp_path / "out", assumed_engine="bullet")
 
 
@@ -167,5 +167,5 @@ def test_a_network_alone_needs_no_engine_that_restarts(around_bullet):
 
 
 def test_a_network_of_single_steps_is_not_put_around_bullet(trained):
-    with pytest.raises(BadCheckpoint, match="recurrent is false.*--engine planar"):
+    with pytest.raises(BadCheckpoint, match="recurrent is false.*`engine` planar"):
         load_dynamics(str(trained.folder), engine="bullet", force=True)

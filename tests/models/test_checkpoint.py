@@ -213,7 +213,7 @@ def test_a_network_is_for_its_pushes_alone(folder):
     model = load_dynamics(str(folder))
     model.check_fits("robot", TIME_STEP)
     with pytest.raises(
-        BadCheckpoint, match=r"kind is 'robot'.*'direct-force'.*--force"
+        BadCheckpoint, match=r"kind is 'robot'.*'direct-force'.*`force`"
     ):
         model.check_fits("direct-force", TIME_STEP)
     with pytest.raises(BadCheckpoint, match=r"time_step is .*data's is 0\.01 s"):

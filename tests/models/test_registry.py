@@ -63,7 +63,7 @@ def test_without_bullet_its_network_says_what_to_install(folder, monkeypatch):
 def test_pushes_of_the_training_are_no_test(folder):
     model = load_dynamics(str(folder))
     card = re.escape(str(folder / CARD))
-    with pytest.raises(BadCheckpoint, match=rf"^{card}: data_seed is 0.*--seed"):
+    with pytest.raises(BadCheckpoint, match=rf"^{card}: data_seed is 0.*`seed`"):
         model.check_fits("robot", TIME_STEP, seed=0)
     edit_card(folder, earlier_seeds=[4])
     model = load_dynamics(str(folder))

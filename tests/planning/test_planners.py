@@ -281,5 +281,5 @@ def test_planners_by_name():
     assert make_planner("tree", deadline=0.5).deadline == 0.5
     with pytest.raises(UnknownName, match="greedy"):
         make_planner("cem")
-    with pytest.raises(BadInput, match="--deadline"):
+    with pytest.raises(BadInput, match="`deadline`"):
         make_planner("greedy", deadline=1.0)

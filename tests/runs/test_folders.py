@@ -126,7 +126,7 @@ def test_other_settings_conflict_and_touch_nothing(tmp_path, other):
     open_here(tmp_path / "run", seed=0)
     (tmp_path / "run" / ".x.partial").write_text("")
     before = files(tmp_path)
-    with pytest.raises(RunConflict, match="choose another --out or the same settings"):
+    with pytest.raises(RunConflict, match="choose another `out` or the same settings"):
         open_here(tmp_path / "run", **other)
     assert files(tmp_path) == before
 

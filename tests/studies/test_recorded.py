@@ -81,7 +81,7 @@ def test_surfaces_are_groups_without_their_speed(recorded):
 
 def test_without_recorded_pushes_there_is_no_table(chain):
     for name in ("recorded-pushes", "recorded-data-efficiency"):
-        with pytest.raises(BadInput, match="--recorded is missing"):
+        with pytest.raises(BadInput, match="`recorded` is missing"):
             load_experiment(name)("quick", chain)
 
 

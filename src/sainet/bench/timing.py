@@ -7,7 +7,7 @@ from typing import Any
 
 import jax
 
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadSetting
 
 
 def seconds(call: Callable[[], Any]) -> float:
@@ -34,6 +34,6 @@ def median_seconds(
 
 
 def check_runs(runs: int) -> None:
-    """Raise `BadInput` unless there is something to take the median of."""
+    """Raise `BadSetting` unless there is something to take the median of."""
     if runs < 1:
-        raise BadInput(f"--runs is {runs}; it must be at least 1.")
+        raise BadSetting("runs", runs, "at least 1")

@@ -30,9 +30,9 @@ class AddBystander:
         use_devices(None)
         from sainet.datasets.bystander import add_bystander
         from sainet.datasets.store import open_store
-        from sainet.runs.errors import require_option
+        from sainet.runs.errors import require
 
-        require_option(self.seed >= 0, "seed", "at least 0", self.seed)
+        require(self.seed >= 0, "seed", "at least 0", self.seed)
         store = open_store(self.data)
         total = store.info.pushes * len(store.info.assumed_engines)
         with progress_bar("Predicting s-bar", total, self.output) as advance:

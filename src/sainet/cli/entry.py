@@ -3,7 +3,9 @@
 import logging
 import sys
 from collections.abc import Sequence
+from functools import reduce
 from itertools import zip_longest
+from operator import or_
 from typing import Annotated, Any
 
 import tyro
@@ -18,31 +20,37 @@ from sainet.cli.evaluate import Evaluate
 from sainet.cli.generate import Generate
 from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
+from sainet.cli.messages import message
 from sainet.cli.output import finish
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.train import Train, going_on
 from sainet.runs.errors import BadInput, SainetError
 
+_COMMANDS = {
+    "demo": Demo,
+    "generate": Generate,
+    "import": Import,
+    "add-bystander": AddBystander,
+    "train": Train,
+    "evaluate": Evaluate,
+    "identify": Identify,
+    "control": Control,
+    "reproduce": Reproduce,
+    "report": MakeReport,
+    "bench": Bench,
+}
+
 
 def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
     """Return the type of all commands, with the defaults that hold for these words."""
     start = _start_from(words)
     default: dict[str, Any] = {} if start is None else {"default": going_on(start)}
-    train = subcommand("train", **default)
-    return (
-        Annotated[Demo, subcommand("demo")]
-        | Annotated[Generate, subcommand("generate")]
-        | Annotated[Import, subcommand("import")]
-        | Annotated[AddBystander, subcommand("add-bystander")]
-        | Annotated[Train, train]
-        | Annotated[Evaluate, subcommand("evaluate")]
-        | Annotated[Identify, subcommand("identify")]
-        | Annotated[Control, subcommand("control")]
-        | Annotated[Reproduce, subcommand("reproduce")]
-        | Annotated[MakeReport, subcommand("report")]
-        | Annotated[Bench, subcommand("bench")]
-    )
+    parts = [
+        Annotated[kind, subcommand(name, **(default if kind is Train else {}))]
+        for name, kind in _COMMANDS.items()
+    ]
+    return reduce(or_, parts)
 
 
 def _start_from(words: Sequence[str]) -> str | None:
@@ -91,7 +99,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         command = parse(words)
         finish(command.run(), command.output)
     except SainetError as error:
-        print(f"sainet: {error}", file=sys.stderr)
+        command_type = _COMMANDS.get(words[0] if words else "")
+        print(f"sainet: {message(error, command_type)}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
         goes_on = isinstance(command, _GOES_ON)
@@ -104,7 +113,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if error.filename is None:
             raise
         # A name that is too long, or a folder that nobody lets us into.
-        reason = f"{error.filename}: {error.strerror}; give another path."
-        print(f"sainet: {reason}", file=sys.stderr)
+        reason = BadInput(f"{error.filename}: {error.strerror}; give another path.")
+        print(f"sainet: {message(reason)}", file=sys.stderr)
         return BadInput.exit_status
     return 0

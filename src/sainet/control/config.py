@@ -2,13 +2,26 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
-from sainet.runs.errors import require_option
+from sainet.runs.errors import require, require_one_of
+from sainet.scenes.quantities import (
+    ALIGNMENT,
+    LARGEST_COUNT,
+    MOST_DISKS,
+    require_count,
+)
 from sainet.worlds.noise_config import NoiseLevel
 
 Goals = Literal["easy", "hard"]
 Knowledge = Literal["true", "nominal"]
+_COUNTS = {
+    "trials": (1, 1_000_000),
+    "pushes": (1, 1_000_000),
+    "disks": (2, MOST_DISKS),
+    "seed": (0, LARGEST_COUNT),
+}
+_LEAST_TOLERANCE = 1e-6  # of a radius
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,17 +60,16 @@ class ControlConfig:
     """Size of the world's noise: none, default or paper-like."""
 
     def __post_init__(self) -> None:
-        """Refuse settings that no trial can have."""
-        for name in ("trials", "pushes"):
-            value = getattr(self, name)
-            require_option(value >= 1, name, "at least 1", value)
-        require_option(self.disks >= 2, "disks", "at least 2", self.disks)  # noqa: PLR2004
-        require_option(self.seed >= 0, "seed", "at least 0", self.seed)
-        require_option(
-            0 < self.tolerance < 1, "tolerance", "between 0 and 1", self.tolerance
-        )
-        require_option(0 < self.aim <= 1, "aim", "above 0, at most 1", self.aim)
-        aligned = 0 <= self.alignment < math.inf
-        require_option(aligned, "alignment", "0 or more, finite", self.alignment)
+        """Check every setting."""
+        for name, (low, high) in _COUNTS.items():
+            require_count(name, getattr(self, name), low=low, high=high)
+        require_one_of("goals", self.goals, get_args(Goals))
+        require_one_of("knows", self.knows, get_args(Knowledge))
+        require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
+        wanted = f"at least {_LEAST_TOLERANCE:g}, below 1"
+        good = _LEAST_TOLERANCE <= self.tolerance < 1
+        require(good, "tolerance", wanted, self.tolerance)
+        ALIGNMENT.require("alignment", self.alignment)
+        require(0 < self.aim <= 1, "aim", "above 0, at most 1", self.aim)
         late = self.deadline is None or 0 < self.deadline < math.inf
-        require_option(late, "deadline", "positive and finite", self.deadline)
+        require(late, "deadline", "positive and finite", self.deadline)

@@ -1,18 +1,56 @@
 """Settings of simulated datasets, free of JAX."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from tyro.conf import Positional
 
 from sainet.engines import ASSUMED_ENGINES, ENGINES
-from sainet.runs.errors import require_option
+from sainet.runs.errors import require, require_one_of
+from sainet.scenes.quantities import (
+    FRICTION,
+    GAP,
+    LARGEST_COUNT,
+    MASS,
+    MOST_DISKS,
+    MOST_PUSHES,
+    MOST_STEPS,
+    PUSHER_RADIUS,
+    PUSHING_FORCE,
+    RADIUS,
+    SPEED,
+    STROKE,
+    Quantity,
+    require_count,
+)
 from sainet.worlds.noise_config import NoiseConfig, NoiseLevel
 
 Setup = Literal["robot", "direct-force"]
 _RIGHT_ANGLE = 90  # degrees
 
 Range = tuple[float] | tuple[float, float]
+
+_COUNTS = {
+    "disks": (1, MOST_DISKS),
+    "pushes": (1, MOST_PUSHES),
+    "chunk_size": (1, MOST_PUSHES),
+    "force_steps": (1, MOST_STEPS),
+    "hold_steps": (0, MOST_STEPS),
+    "seed": (0, LARGEST_COUNT),
+}
+_RANGES = {
+    "mass_kg": MASS,
+    "radius_mm": RADIUS.times(1000, "mm"),
+    "stroke_mm": STROKE.times(1000, "mm"),
+    "speed_mm_s": SPEED.times(1000, "mm/s"),
+    "table_friction": FRICTION,
+    "contact_friction": FRICTION,
+}
+_QUANTITIES = {
+    "pusher_radius_mm": PUSHER_RADIUS.times(1000, "mm"),
+    "force_n": PUSHING_FORCE,
+    "gap_mm": GAP.times(1000, "mm"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,41 +110,24 @@ class GenerateConfig:
     """Pushes that are simulated, written and read at a time."""
 
     def __post_init__(self) -> None:
-        """Refuse settings that no scene can have."""
-        _require_one_of("setup", self.setup, get_args(Setup))
-        _require_one_of("noise-level", self.noise_level, get_args(NoiseLevel))
-        _require_one_of("engine", self.engine, tuple(ENGINES))
+        """Check every setting."""
+        require_one_of("setup", self.setup, get_args(Setup))
+        require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
+        require_one_of("engine", self.engine, ENGINES)
         for name in self.assumed_engine:
-            _require_one_of("assumed-engine", name, ASSUMED_ENGINES)
-        unlike = len(set(self.assumed_engine)) == len(self.assumed_engine) > 0
-        require_option(
-            unlike, "assumed-engine", "one or more unlike names", self.assumed_engine
-        )
-        for name in ("disks", "pushes", "chunk_size", "force_steps"):
-            require_option(
-                getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
-            )
-        require_option(
-            self.hold_steps >= 0, "hold-steps", "at least 0", self.hold_steps
-        )
-        require_option(self.seed >= 0, "seed", "at least 0", self.seed)
-        for name in ("mass_kg", "radius_mm", "stroke_mm", "speed_mm_s"):
-            _check_range(name, getattr(self, name), positive=True)
-        for name in ("table_friction", "contact_friction"):
-            _check_range(name, getattr(self, name), positive=False)
-        for name in ("pusher_radius_mm", "force_n"):
-            value = getattr(self, name)
-            require_option(_finite(value) and value > 0, name, "positive", value)
+            require_one_of("assumed_engine", name, ASSUMED_ENGINES)
+        different = len(set(self.assumed_engine)) == len(self.assumed_engine) > 0
+        wanted = "one or more different names"
+        require(different, "assumed_engine", wanted, self.assumed_engine)
+        for name, (low, high) in _COUNTS.items():
+            require_count(name, getattr(self, name), low=low, high=high)
+        for name, quantity in _RANGES.items():
+            _check_range(name, getattr(self, name), quantity)
+        for name, quantity in _QUANTITIES.items():
+            quantity.require(name, getattr(self, name))
         for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
             value = getattr(self, name)
-            require_option(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
-        require_option(
-            _finite(self.gap_mm) and self.gap_mm >= 0,
-            "gap-mm",
-            "zero or positive (disks must not overlap)",
-            self.gap_mm,
-        )
-        _check_noise(self.noise)
+            require(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
 
 
 def bounds(values: Range) -> tuple[float, float]:
@@ -114,24 +135,7 @@ def bounds(values: Range) -> tuple[float, float]:
     return values[0], values[-1]
 
 
-def _check_range(name: str, values: Range, *, positive: bool) -> None:
-    wanted = "positive, low before high" if positive else "0 or more, low before high"
-    good = len(values) in (1, 2) and all(map(_finite, values))
-    good = good and (values[0] > 0 if positive else values[0] >= 0)
-    require_option(good and values[0] <= values[-1], name, wanted, values)
-
-
-def _check_noise(noise: NoiseConfig) -> None:
-    for name, value in asdict(noise).items():
-        scale = name in ("correlation_time", "friction_length_mm")
-        good = _finite(value) and (value > 0 if scale else value >= 0)
-        wanted = "positive" if scale else "0 or more"
-        require_option(good, name, wanted, value)
-
-
-def _require_one_of(name: str, value: str, known: tuple[str, ...]) -> None:
-    require_option(value in known, name, "one of " + ", ".join(known), value)
-
-
-def _finite(value: float) -> bool:
-    return abs(value) < float("inf")
+def _check_range(name: str, values: Range, quantity: Quantity) -> None:
+    require(len(values) in (1, 2), name, "one number or two", values)
+    quantity.require(name, values)
+    require(values[0] <= values[-1], name, "a range, low before high", values)

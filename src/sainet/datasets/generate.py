@@ -21,7 +21,7 @@ from sainet.datasets.writer import (
 )
 from sainet.engines import make_assumed_engine, make_engine
 from sainet.engines.bullet.engine import MOST_DISKS, BulletEngine
-from sainet.runs.errors import require_option
+from sainet.runs.errors import require
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
 
@@ -78,7 +78,7 @@ def _check_possible(config: GenerateConfig) -> None:
     engines += [make_assumed_engine(name).engine for name in config.assumed_engine]
     if any(isinstance(engine, BulletEngine) for engine in engines):
         wanted = f"at most {MOST_DISKS} with the engine bullet"
-        require_option(config.disks <= MOST_DISKS, "disks", wanted, config.disks)
+        require(config.disks <= MOST_DISKS, "disks", wanted, config.disks)
     for index in range(store_info(config).chunks):
         draw(config, chunk_generator(config.seed, index), config.chunk_size)
 

@@ -81,8 +81,8 @@ def _place(
         else:
             return np.stack(placed)
     raise BadInput(
-        f"--disks {config.disks}: no room was found for all of them without "
-        "overlap; widen --placement-deg or narrow --radius-mm."
+        f"`disks` is {config.disks}: they could not be placed without overlap; "
+        "increase `placement_deg` or narrow `radius_mm`."
     )
 
 
@@ -106,8 +106,8 @@ def _with_free_pusher(
         for push in inside:
             position[push] = _place(config, again, draws.radius[push])
     raise BadInput(
-        f"--disks {config.disks}: no room was found for the pusher without overlap; "
-        "narrow --placement-deg or --pusher-radius-mm."
+        f"`disks` is {config.disks}: the pusher could not be placed without overlap; "
+        "reduce `placement_deg` or `pusher_radius_mm`."
     )
 
 

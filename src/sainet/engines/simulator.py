@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import msgspec
 
 from sainet.runs.documents import content_hash
-from sainet.runs.errors import UnknownName
+from sainet.runs.errors import unknown_name
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
 
 if TYPE_CHECKING:
@@ -117,8 +117,7 @@ def simulator_named(name: str) -> SimulatorSpec:
         UnknownName: there is none.
     """
     if name not in SIMULATORS:
-        known = ", ".join(SIMULATORS)
-        raise UnknownName(f"No simulator named {name!r}. Available: {known}.")
+        raise unknown_name("simulator", name, SIMULATORS)
     return SIMULATORS[name]
 
 

@@ -131,7 +131,7 @@ def evaluate(
     names = [model.name for model in models]
     if len(set(names)) < len(names):
         raise BadInput(
-            f"--model: {', '.join(names)} are not all different; rename one."
+            f"`model`: {', '.join(names)} are not all different; rename one."
         )
     info = store.info
     for model in () if force else models:
@@ -185,7 +185,7 @@ def _limit(store: Store, steps: int | None) -> int:
         return store.info.steps if recorded else min(PAPER_STEPS, store.info.steps)
     if not 0 <= steps <= store.info.steps:
         raise BadInput(
-            f"--steps is {steps}; {store.path} has {store.info.steps} (0 takes all)."
+            f"`steps` is {steps}; {store.path} has {store.info.steps} (0 takes all)."
         )
     return steps or store.info.steps
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from sainet.runs.errors import require_option
+from sainet.runs.errors import require
 
 ModelKind = Literal["in", "sain"]
 Features = Literal["paper", "place"]
@@ -81,29 +81,23 @@ class FitConfig:
     def __post_init__(self) -> None:
         """Refuse settings that no training can have."""
         for name in ("iterations", "batch_size", "halve_every", "steps", "hold"):
-            require_option(
-                getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
-            )
+            require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
         for name in ("log_every", "checkpoint_every"):
-            require_option(
-                getattr(self, name) >= 1, name, "at least 1", getattr(self, name)
-            )
+            require(getattr(self, name) >= 1, name, "at least 1", getattr(self, name))
         for name in ("learning_rate", "clip_norm"):
             value = getattr(self, name)
-            require_option(math.isfinite(value) and value > 0, name, "positive", value)
+            require(math.isfinite(value) and value > 0, name, "positive", value)
         weights = [f"weight_{n}" for n in ("position", "rotation", "velocity", "spin")]
         others = ("linear_from", "average", "patience", "seed")
         l2 = () if self.l2 is None else ("l2",)
         for name in (*l2, *weights, *others):
             value = getattr(self, name)
-            require_option(
-                math.isfinite(value) and value >= 0, name, "0 or more", value
-            )
+            require(math.isfinite(value) and value >= 0, name, "0 or more", value)
         share = self.validation_share
-        require_option(0 <= share < 1, "validation_share", "from 0 to below 1", share)
+        require(0 <= share < 1, "validation_share", "from 0 to below 1", share)
         if self.patience:
-            require_option(
-                share > 0, "patience", "0 without --validation-share", self.patience
+            require(
+                share > 0, "patience", "0 without `validation_share`", self.patience
             )
 
     def for_pushes(self, pushes: int) -> "FitConfig":

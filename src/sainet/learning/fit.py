@@ -115,7 +115,7 @@ def _start(name: str | None) -> Start | None:
     if name not in SHIPPED and not Path(name).exists():
         known = ", ".join((FROM_ENGINE, *SHIPPED))
         raise UnknownName(
-            f"--start-from is {name!r}; it must be {known}, or the folder of a trained "
+            f"`start_from` is {name!r}; it must be {known}, or the folder of a trained "
             "network."
         )
     folder = network_folder(name)
@@ -205,7 +205,7 @@ def _check_finite(line: dict[str, Any], out: Path) -> None:
     if not np.isfinite(line["loss"]):
         raise Diverged(
             f"{out}: the loss is {line['loss']} at iteration {line['iteration']}; "
-            "lower --learning-rate or --clip-norm."
+            "lower `learning_rate` or `clip_norm`."
         )
 
 

@@ -141,12 +141,12 @@ def check_data(task: Task) -> None:
     _check_assumed(task)
     if task.from_engine and task.inner is None:
         raise BadInput(
-            f"--start-from {FROM_ENGINE} needs a network that corrects an engine; "
+            f"`start_from` {FROM_ENGINE} needs a network that corrects an engine; "
             f"train sain, not {task.model}."
         )
     if task.config.validation_share and task.validation is None:
         raise BadInput(
-            f"--validation-share is {task.config.validation_share}; {path} has no two "
+            f"`validation_share` is {task.config.validation_share}; {path} has no two "
             "pushes that are not repeats of each other."
         )
     if task.start:
@@ -159,7 +159,7 @@ def _check_assumed(task: Task) -> None:
     info, path, name = task.store.info, task.store.path, task.assumed.name
     if task.assumed.is_stored and name not in info.assumed_engines:
         raise BadStore(
-            f"{path}: assumed_engines has no {name!r}; give --assumed-engine "
+            f"{path}: assumed_engines has no {name!r}; give `assumed_engine` "
             f"{' or '.join(info.assumed_engines)}, which it has, or the folder of an "
             "identified engine."
         )
@@ -184,12 +184,12 @@ def _check_start(task: Task, start: Start) -> None:
         if found != value:
             raise BadCheckpoint(
                 f"{start.folder / CARD}: {name} is {found!r}, this training's is "
-                f"{value!r}; give --start-from another network."
+                f"{value!r}; give `start_from` another network."
             )
     _check_inner_engine(task, start)
     if card.features == "place" and task.config.features == "paper":
         raise BadCheckpoint(
-            f"{start.folder / CARD}: features is 'place'; give --features place, too."
+            f"{start.folder / CARD}: features is 'place'; give `features` place, too."
         )
 
 
@@ -204,7 +204,7 @@ def _check_inner_engine(task: Task, start: Start) -> None:
     if found != wanted and not (wanted == IDENTIFIED and found in alike):
         raise BadCheckpoint(
             f"{start.folder / CARD}: inner_engine is {found!r}, this training's is "
-            f"{wanted!r}; give --start-from another network."
+            f"{wanted!r}; give `start_from` another network."
         )
 
 
@@ -212,13 +212,13 @@ def _check_single_steps(task: Task) -> None:
     info, path = task.store.info, task.store.path
     if info.kind != "robot" or info.engine == "recorded":
         raise BadStore(
-            f"{path}: --no-recurrent needs simulated pushes of the robot setup, whose "
-            "state is known at every step; leave it out."
+            f"{path}: single steps need simulated pushes of the robot setup, whose "
+            "state is known at every step; leave `recurrent` on."
         )
     if task.inner and task.inner.make().on_host:
         raise BadInput(
-            f"--assumed-engine {task.inner.name} cannot restart at every step of a "
-            "training; take planar, or leave --no-recurrent out."
+            f"`assumed_engine` {task.inner.name} cannot restart at every step of a "
+            "training; take planar, or leave `recurrent` on."
         )
 
 

@@ -41,22 +41,22 @@ class NamedDynamics:
         if self.card.kind != kind:
             raise BadCheckpoint(
                 f"{path}: kind is {self.card.kind!r}, the data's is "
-                f"{kind!r}; train a network on such pushes, or give --force."
+                f"{kind!r}; train a network on such pushes, or give `force`."
             )
         if abs(self.card.time_step - time_step) > _SAME_TIME:
             raise BadCheckpoint(
                 f"{path}: time_step is {self.card.time_step} s, the data's is "
-                f"{time_step} s; train a network on such data, or give --force."
+                f"{time_step} s; train a network on such data, or give `force`."
             )
         if seed is not None and seed in self.card.data_seeds:
             raise BadCheckpoint(
                 f"{path}: data_seed is {seed} (its own, or that of the network which "
                 "it started from), and so is the seed of the data: the network may "
                 "have been trained on these very pushes. Generate others with another "
-                "--seed, or give --force."
+                "`seed`, or give `force`."
             )
         if data is not None and data == self.card.data:
             raise BadCheckpoint(
                 f"{path}: data is {data[:12]}..., and so are these pushes: the network "
-                "was trained on them. Test it on others, or give --force."
+                "was trained on them. Test it on others, or give `force`."
             )

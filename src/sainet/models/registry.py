@@ -77,7 +77,7 @@ def _restarted(folder: Path, dynamics: AbstractDynamics) -> AbstractDynamics:
     if dynamics.on_host:
         raise BadCheckpoint(
             f"{folder / CARD}: recurrent is false, and the engine cannot restart at "
-            "every step; give --engine planar, or train it without --no-recurrent."
+            "every step; give `engine` planar, or train it with `recurrent`."
         )
     return Restarted(dynamics)
 
@@ -106,7 +106,7 @@ def _check_identified(folder: Path, engine: str | None) -> None:
     if engine not in (None, "planar"):
         raise BadInput(
             f"{folder / FILE}: its parameters are those of the planar engine, "
-            f"not of {engine}; leave --engine out."
+            f"not of {engine}; leave `engine` out."
         )
 
 
@@ -114,8 +114,8 @@ def _check_engine(folder: Path, card: Card, engine: str) -> None:
     own = card.inner_engine
     if own is not None and _made_of(own) != engine:
         raise BadCheckpoint(
-            f"{folder / CARD}: inner_engine is {own!r}, not {engine!r}; leave --engine "
-            "out, train a network around that engine, or give --force."
+            f"{folder / CARD}: inner_engine is {own!r}, not {engine!r}; leave `engine` "
+            "out, train a network around that engine, or give `force`."
         )
 
 

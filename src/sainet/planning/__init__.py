@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadSetting
 from sainet.runs.names import load_named
 
 if TYPE_CHECKING:
@@ -19,15 +19,15 @@ def make_planner(name: str, *, deadline: float | None = None) -> "AbstractPlanne
 
     Args:
         name: of the planner.
-        deadline: s, after which the best plan so far is taken; of `tree` alone.
+        deadline: s, after which the best plan so far is taken; only for `tree`.
 
     Raises:
         UnknownName: no planner has this name.
-        BadInput: this planner knows no deadline.
+        BadSetting: this planner has no deadline.
     """
     planner = load_named("planner", PLANNERS, name)
     if deadline is None:
         return planner()
     if name != "tree":
-        raise BadInput(f"--deadline is of --planner tree alone, not of {name}.")
+        raise BadSetting("deadline", deadline, "None unless `planner` is tree")
     return planner(deadline=deadline)

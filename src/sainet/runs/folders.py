@@ -78,7 +78,7 @@ def _lock(path: Path) -> FolderLock | None:
     except BlockingIOError:
         raise RunConflict(
             f"{path}: another sainet is at work there; wait until it has ended, or "
-            "choose another --out."
+            "choose another `out`."
         ) from None
     except OSError as error:
         raise write_error(path, error) from error
@@ -92,7 +92,7 @@ def remake(path: Path) -> str:
 def _check_free(path: Path, wanted: dict[str, Any]) -> None:
     """Check that a folder is missing, empty, or of a run with these settings."""
     if path.exists() and not path.is_dir():
-        raise RunConflict(f"{path}: is a file; give --out a folder.")
+        raise RunConflict(f"{path}: is a file; give `out` a folder.")
     if (path / CONFIG).exists():
         _check_same(path, read_json(path / CONFIG, RunConflict), wanted)
     elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
@@ -109,7 +109,7 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
         if found.get(name) != wanted.get(name):
             raise RunConflict(
                 f"{path / CONFIG}: {name} is {found.get(name)!r} there and "
-                f"{wanted.get(name)!r} here; choose another --out or the same settings."
+                f"{wanted.get(name)!r} here; choose another `out` or the same settings."
             )
 
 

@@ -1,21 +1,21 @@
-"""What a name stands for, loaded when it is asked for.
+"""Objects by name, loaded when they are asked for.
 
 A table leads from each name to ``module:attribute``, so that listing names loads no
-JAX, and an extra that is missing costs nothing until somebody wants it.
+JAX, and an extra that is missing matters only when its name is asked for.
 """
 
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
-from sainet.runs.errors import UnknownName
+from sainet.runs.errors import unknown_name
 
 
 def load_named(kind: str, table: Mapping[str, str], name: str) -> Any:  # noqa: ANN401
-    """Return the attribute that a name stands for.
+    """Return the attribute that belongs to a name.
 
     Args:
-        kind: what the table holds, for the message: `engine`, say.
+        kind: of the objects, for the message: "engine".
         table: from names to ``module:attribute``.
         name: to look up.
 
@@ -23,7 +23,6 @@ def load_named(kind: str, table: Mapping[str, str], name: str) -> Any:  # noqa: 
         UnknownName: the table has no such name.
     """
     if name not in table:
-        available = ", ".join(sorted(table))
-        raise UnknownName(f"No {kind} named {name!r}. Available: {available}.")
+        raise unknown_name(kind, name, table)
     module, _, attribute = table[name].partition(":")
     return getattr(import_module(module), attribute)

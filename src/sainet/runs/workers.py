@@ -13,7 +13,7 @@ from itertools import cycle, islice
 from multiprocessing.queues import SimpleQueue
 from typing import Any, final
 
-from sainet.runs.errors import BadInput, SainetError
+from sainet.runs.errors import BadSetting, SainetError
 
 # What a failure sends to the workers of its own pool. Those of a background job ignore
 # SIGINT, which a shell means for what stands in the foreground.
@@ -39,10 +39,10 @@ def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Exe
         core_each: see `spawned_pool`.
 
     Raises:
-        BadInput: fewer than one worker.
+        BadSetting: fewer than one worker.
     """
     if workers is not None and workers < 1:
-        raise BadInput(f"--workers is {workers}; it must be at least 1.")
+        raise BadSetting("workers", workers, "at least 1")
     pool = spawned_pool(workers or core_count(), core_each=core_each)
     try:
         yield pool

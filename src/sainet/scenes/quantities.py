@@ -5,13 +5,14 @@ check against these bounds. `Mass` and the other annotated types carry the bound
 msgspec documents; `Quantity.check` applies them to numbers and arrays. Free of JAX.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from numbers import Integral
 from typing import Annotated
 
 import msgspec
 import numpy as np
 
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, BadSetting
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,11 @@ class Quantity:
     def meta(self) -> msgspec.Meta:
         """The range as msgspec checks it when it decodes (JSON holds no NaN)."""
         return msgspec.Meta(ge=self.low, le=self.high)
+
+    def times(self, factor: float, unit: str) -> "Quantity":
+        """Return the quantity in a unit that is `factor` times smaller."""
+        low, high = self.low * factor, self.high * factor
+        return replace(self, unit=unit, low=low, high=high, mistaken_for="")
 
     def accepts(self, values: object) -> bool:
         """Return whether a number, or every number of an array, is in the range."""
@@ -67,6 +73,12 @@ class Quantity:
             + (f"; {remedy}." if remedy else ".")
         )
 
+    def require(self, name: str, values: object) -> None:
+        """Raise `BadSetting` unless all values of a setting are in the range."""
+        value = self._first_outside(values)
+        if value is not None:
+            raise BadSetting(name, f"{value:g}", self.wanted)
+
     def _first_outside(self, values: object) -> float | None:
         numbers = np.asarray(values, np.float64)
         bad = ~((numbers >= self.low) & (numbers <= self.high))  # NaN as well
@@ -84,10 +96,18 @@ ANGLE = Quantity("angle", "rad", -1e4, 1e4)
 VELOCITY = Quantity("velocity", "m/s", -100.0, 100.0, "mm/s")
 SPIN = Quantity("spin", "rad/s", -1e4, 1e4)
 FORCE = Quantity("force", "N", -1e4, 1e4)
+PUSHING_FORCE = Quantity("pushing force", "N", 1e-6, 1e4)
 PUSHER_MASS = Quantity("pusher mass", "kg", 1e-3, 1e4, "grams")
 DAMPING = Quantity("damping", "N s/m", 0.0, 1e6)
 STROKE = Quantity("stroke", "m", 1e-4, 1.0, "millimetres")
 SPEED = Quantity("speed", "m/s", 1e-4, 10.0, "mm/s")
+ALIGNMENT = Quantity("alignment weight", "m", 0.0, 1e4)
+GAP = Quantity("gap", "m", 0.0, 1.0, "millimetres")
+LENGTH_DEVIATION = Quantity("standard deviation", "m", 0.0, 0.1, "millimetres")
+ANGLE_DEVIATION = Quantity("standard deviation", "deg", 0.0, 90.0)
+FRACTION = Quantity("fraction", "", 0.0, 10.0)
+CORRELATION_TIME = Quantity("correlation time", "s", 1e-4, 1e4)
+CORRELATION_LENGTH = Quantity("correlation length", "m", 1e-4, 100.0, "millimetres")
 TIME_STEP_RANGE = Quantity("time step", "s", 1e-5, 0.1, "milliseconds")
 
 Mass = Annotated[float, MASS.meta]  # kg
@@ -100,3 +120,13 @@ TimeStep = Annotated[float, TIME_STEP_RANGE.meta]  # s
 MOST_DISKS = 100  # of a scene
 MOST_PUSHES = 10_000_000  # of a dataset
 MOST_STEPS = 100_000  # of a push
+LARGEST_COUNT = 2**63 - 1  # of a seed, in a document
+
+
+def require_count(
+    name: str, value: int, *, low: int = 1, high: int = LARGEST_COUNT
+) -> None:
+    """Raise `BadSetting` unless a setting is a whole number in a range."""
+    if not (isinstance(value, Integral) and low <= value <= high):
+        wanted = f"at least {low}" if value < low else f"from {low} to {high}"
+        raise BadSetting(name, value, wanted)

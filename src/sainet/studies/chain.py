@@ -129,7 +129,7 @@ class Chain:
         """
         if self.recorded is None:
             raise BadInput(
-                "--recorded is missing: give the dataset that 'sainet import "
+                "`recorded` is missing: give the dataset that 'sainet import "
                 "mitpush-endpoints' made of recorded pushes."
             )
         return open_store(self.recorded)

@@ -3,28 +3,50 @@
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from sainet.scenes.quantities import (
+    ANGLE_DEVIATION,
+    CORRELATION_LENGTH,
+    CORRELATION_TIME,
+    FRACTION,
+    LENGTH_DEVIATION,
+)
+
 NoiseLevel = Literal["none", "default", "paper-like"]
 _FACTOR = {"none": 0.0, "default": 1.0, "paper-like": 3.0}
+_QUANTITIES = {
+    "tracking_mm": LENGTH_DEVIATION.times(1000, "mm"),
+    "correlation_time": CORRELATION_TIME,
+    "force_fraction": FRACTION,
+    "friction_fraction": FRACTION,
+    "friction_length_mm": CORRELATION_LENGTH.times(1000, "mm"),
+    "capture_mm": LENGTH_DEVIATION.times(1000, "mm"),
+    "capture_deg": ANGLE_DEVIATION,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class NoiseConfig:
-    """What makes the simulated truth differ from any engine; 0 turns a source off."""
+    """Noise that separates ground truth from any engine; 0 turns a source off."""
 
     tracking_mm: float = 0.2
-    """Error of the pusher about its commanded path, standard deviation in mm."""
+    """Pusher tracking error (standard deviation, mm)."""
     correlation_time: float = 0.1
-    """Of the tracking and force errors (Ornstein-Uhlenbeck), in seconds."""
+    """Correlation time of tracking and force errors (Ornstein-Uhlenbeck, s)."""
     force_fraction: float = 0.1
-    """Error of the force on the pusher, as a fraction of it."""
+    """Force error on the pusher (fraction of the force)."""
     friction_fraction: float = 0.15
-    """Variation of the table's friction over the table, as a fraction of it."""
+    """Variation of the table friction over the table (fraction of the friction)."""
     friction_length_mm: float = 30.0
-    """Correlation length of that variation, in mm."""
+    """Correlation length of the table-friction variation (mm)."""
     capture_mm: float = 0.15
-    """Error of the motion capture's positions, white, in mm."""
+    """White noise of measured positions (standard deviation, mm)."""
     capture_deg: float = 0.1
-    """Error of the motion capture's angles, white, in degrees."""
+    """White noise of measured angles (standard deviation, degrees)."""
+
+    def __post_init__(self) -> None:
+        """Check the range of every setting."""
+        for name, quantity in _QUANTITIES.items():
+            quantity.require(name, getattr(self, name))
 
 
 def at_level(noise: NoiseConfig, level: NoiseLevel) -> NoiseConfig:

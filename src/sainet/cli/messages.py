@@ -1,0 +1,50 @@
+"""Errors of the library as one line of the command line."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import Any, get_args, get_type_hints
+
+from tyro.conf import Positional
+
+from sainet.runs.errors import SainetError, shown
+
+_POSITIONAL = get_args(Positional[int])[1]
+_LONGEST = 300  # characters
+_QUOTED = re.compile(r"`([a-z][a-z0-9_]*)`")
+
+
+def message(error: SainetError, command: type | None = None) -> str:
+    """Return the message of an error in one line, with options for settings.
+
+    The library quotes settings in backquotes; those that the command has as options
+    become `--name`.
+
+    Args:
+        error: of the library.
+        command: the dataclass of the command that was called, if it is known.
+    """
+    options = set(_options(command)) if command else set()
+
+    def option(found: re.Match[str]) -> str:
+        name = found[1]
+        return "--" + name.replace("_", "-") if name in options else found[0]
+
+    text = shown(" ".join(str(error).split()), None)
+    text = _QUOTED.sub(option, text)
+    if len(text) <= _LONGEST:
+        return text
+    # The end holds the remedy.
+    half = (_LONGEST - len(" ... ")) // 2
+    return f"{text[:half]} ... {text[-half:]}"
+
+
+def _options(settings: Any) -> Iterator[str]:  # noqa: ANN401
+    """Yield the names of all options of a dataclass of settings, nested ones too."""
+    hints = get_type_hints(settings, include_extras=True)
+    for field in fields(settings):
+        hint = hints[field.name]
+        if is_dataclass(hint):
+            yield from _options(hint)
+        elif _POSITIONAL not in getattr(hint, "__metadata__", ()):
+            yield field.name
