@@ -20,49 +20,55 @@ PYTEST := -m pytest -n $(WORKERS) --dist worksteal
 PIP_TOOLS := pip-tools==7.6.2
 PLAIN_PIP := env -u PIP_FIND_LINKS -u PIP_EXTRA_INDEX_URL -u PIP_INDEX_URL \
 	PIP_CONFIG_FILE=/dev/null CUSTOM_COMPILE_COMMAND="make lock"
+COMPILE := $(PLAIN_PIP) .venv-lock/bin/pip-compile --quiet --build-deps-for wheel \
+	--generate-hashes --strip-extras --allow-unsafe --no-annotate \
+	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
+UPGRADE ?=
 
-.PHONY: help setup test demo check format results bench lock lower-bounds torch-env clean
+.PHONY: help setup setup-dev test demo check format results bench lock lower-bounds torch-env clean
 
 help:  ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) \
 	| sed -E 's/^([a-z-]+):.*## /\1 /' \
 	| while read -r name text; do printf '  make %-14s %s\n' "$$name" "$$text"; done
 
-setup:  ## Make .venv from the lock when it is missing or stale
-	@sh tools/setup.sh "$(PYTHON)"
+setup:  ## Make .venv from requirements.lock when it is missing or stale
+	@sh tools/setup.sh "$(PYTHON)" base
 
-test: setup  ## Run the test suite (PYTEST_ARGS='tests/engines -k slides' for a part)
+setup-dev:  ## Also install what tests and checks need
+	@sh tools/setup.sh "$(PYTHON)" dev
+
+test: setup-dev  ## Run the test suite (PYTEST_ARGS='tests/engines -k slides' for a part)
 	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
 demo: setup  ## Show the whole method, small, in runs/demo/report.html
 	$(BIN)/sainet demo
 
-check: setup  ## Lint, format, types and floors
+check: setup-dev  ## Lint, format, types and floors
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright
 	$(BIN)/lint-imports
 
-format: setup  ## Rewrite the sources the way `make check` wants them
+format: setup-dev  ## Rewrite the sources the way `make check` wants them
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-results: setup  ## Measure every figure of docs/results.md again (long)
+results: setup-dev  ## Measure every figure of docs/results.md again (long)
 	$(BIN)/python tools/results.py
 
-bench: setup  ## Run the benchmarks
+bench: setup-dev  ## Run the benchmarks
 	$(BIN)/sainet bench
 
-lock:  ## Remake requirements.lock, on Python 3.11
+lock:  ## Remake both locks, on Python 3.11 (UPGRADE=--upgrade for newer versions)
 	python3.11 -m venv --clear .venv-lock
 	$(PLAIN_PIP) .venv-lock/bin/pip install -qq $(PIP_TOOLS)
-	$(PLAIN_PIP) .venv-lock/bin/pip-compile --quiet --upgrade --extra test --extra dev \
-		--generate-hashes --strip-extras --allow-unsafe --no-annotate \
-		--no-emit-index-url --no-emit-find-links --no-emit-trusted-host \
-		--output-file requirements.lock pyproject.toml
+	$(COMPILE) $(UPGRADE) --output-file requirements.lock pyproject.toml
+	$(COMPILE) $(UPGRADE) --constraint requirements.lock --extra test --extra dev \
+		--output-file requirements-dev.lock pyproject.toml
 	# Made on Python 3.11, the lock would ask for it on newer ones as well.
-	sed -i 's/^pybullet==\([^ ;]*\) /pybullet==\1 ; python_version < "3.12" /' \
-		requirements.lock
+	sed -i 's/^pybullet==\([^ ;]*\) \\/pybullet==\1 ; python_version < "3.12" \\/' \
+		requirements-dev.lock
 	rm -rf .venv-lock
 
 lower-bounds:  ## Run the suite with the oldest dependencies that pyproject.toml allows

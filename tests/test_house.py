@@ -151,8 +151,23 @@ def normal(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def test_the_lock_holds_names_versions_and_hashes_alone():
-    lines = (REPOSITORY / "requirements.lock").read_text().splitlines()
+LOCKS = ("requirements.lock", "requirements-dev.lock")
+
+
+def pinned(lock: str) -> set[str]:
+    """Names and versions in a lock."""
+    text = (REPOSITORY / lock).read_text()
+    return set(re.findall(r"^[a-z0-9-]+==[^\s;]+", text, re.MULTILINE))
+
+
+def wanted(requirements: list[str]) -> set[str]:
+    """Names of the distributions that these requirements are for."""
+    return {normal(re.split(r"[\[><=;~! ]", each)[0]) for each in requirements}
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_a_lock_has_only_names_versions_and_hashes(name: str):
+    lines = (REPOSITORY / name).read_text().splitlines()
     entry = re.compile(r"[a-z0-9-]+==[\w.!+]+( ; .+)? \\")
     digest = re.compile(r"    --hash=sha256:[0-9a-f]{64}( \\)?")
     stray = [
@@ -165,15 +180,19 @@ def test_the_lock_holds_names_versions_and_hashes_alone():
     assert "://" not in comments and "index" not in comments
 
 
-def test_the_lock_covers_every_dependency_and_no_torch():
-    lock = (REPOSITORY / "requirements.lock").read_text()
-    locked = set(re.findall(r"^([a-z0-9-]+)==", lock, re.MULTILINE))
+def test_locks_cover_every_dependency_and_no_torch():
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
-    extras = project["optional-dependencies"].values()
-    wanted = [*project["dependencies"], *(each for extra in extras for each in extra)]
-    names = {normal(re.split(r"[\[><=;~! ]", each)[0]) for each in wanted}
-    assert names <= locked, "run `make lock`"
-    assert not {name for name in locked if name.startswith(("torch", "nvidia"))}
+    base, dev = map(pinned, LOCKS)
+    assert base <= dev, "run `make lock`"
+    names = {name: {pin.partition("==")[0] for pin in pinned(name)} for name in LOCKS}
+    extras = project["optional-dependencies"]
+    assert wanted(project["dependencies"]) <= names["requirements.lock"]
+    for extra in extras.values():
+        assert wanted(extra) <= names["requirements-dev.lock"], "run `make lock`"
+    assert not {pin for pin in dev if pin.startswith(("torch", "nvidia"))}
+    # `make demo` installs this lock: no tests, no linters, no Bullet.
+    left_out = wanted(extras["test"] + extras["dev"]) - {"hatchling", "pillow"}
+    assert not left_out & names["requirements.lock"]
 
 
 def test_the_version_stands_in_one_piece():
