@@ -17,7 +17,7 @@ _HOMES = {
     "FitConfig": "sainet.learning.config",
     "ForceControls": "sainet.scenes.controls",
     "GenerateConfig": "sainet.datasets.config",
-    "InteractionNetwork": "sainet.models.interaction",
+    "InteractionNetwork": "sainet.models.correctors.interaction",
     "PathControls": "sainet.scenes.controls",
     "PlanarEngine": "sainet.engines.planar.engine",
     "Push": "sainet.scenes.pushes",
@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from sainet.identification.identify import identify
     from sainet.learning.config import FitConfig
     from sainet.learning.fit import fit
+    from sainet.models.correctors.interaction import InteractionNetwork
     from sainet.models.dynamics import AbstractDynamics, predict
-    from sainet.models.interaction import InteractionNetwork
     from sainet.models.registry import load_dynamics
     from sainet.planning import make_planner
     from sainet.scenes.controls import ForceControls, PathControls

@@ -24,16 +24,17 @@ from sainet.bench.training import TrainingLoop, counted_gflop
 from sainet.cli.bench import Bench
 from sainet.cli.output import Output
 from sainet.learning.step import trained_layers, with_layers
-from sainet.models.features import Drive, FeatureSizes, Still, in_columns
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.features import feature_set
+from sainet.models.inputs import Drive, Still, in_columns
 from sainet.runs.errors import BadInput, SainetError, UnknownName
 
 TIME_STEP = 1 / 240
 
 
 def network_of(kind: str, *, augmented: bool) -> InteractionNetwork:
-    sizes = FeatureSizes(kind, augmented)
-    return InteractionNetwork(sizes, time_step=TIME_STEP, key=jax.random.key(0))
+    features = feature_set(kind, simulator=augmented)
+    return InteractionNetwork(features, time_step=TIME_STEP, key=jax.random.key(0))
 
 
 def test_the_counted_work_is_what_one_counts_by_hand():
@@ -68,10 +69,7 @@ def is_jaxpr(value: object) -> bool:
 @pytest.mark.parametrize("kind", ["robot", "direct-force"])
 def test_the_counted_work_is_what_jax_compiles(kind, augmented, bodies):
     network, pushes = network_of(kind, augmented=augmented), 7
-    drive, still = (
-        Drive(*driven(kind, augmented, pushes, bodies)),
-        stills(pushes, bodies),
-    )
+    drive, still = driven(kind, augmented, pushes, bodies), stills(pushes, bodies)
 
     def loss(layers, motion):
         step = with_layers(network, layers).step
@@ -84,17 +82,16 @@ def test_the_counted_work_is_what_jax_compiles(kind, augmented, bodies):
     assert products(jaxpr.jaxpr) == round(counted * 1e9)
 
 
-def driven(kind: str, augmented: bool, pushes: int, bodies: int) -> list[jax.Array]:
-    action, pusher = (2, 2) if kind == "robot" else (4, 0)
-    simulated = 3 * augmented
-    shapes = (action,), (pusher,), (bodies, simulated), (bodies, simulated)
-    return [jnp.ones((pushes, *shape)) for shape in shapes]
+def driven(kind: str, augmented: bool, pushes: int, bodies: int) -> Drive:
+    action = jnp.ones((pushes, 2 if kind == "robot" else 4))
+    pusher = jnp.ones((pushes, 2)) if kind == "robot" else None
+    step = jnp.ones((pushes, bodies, 3)) if augmented else None
+    return Drive(action, pusher, step, step)
 
 
 def stills(pushes: int, bodies: int) -> Still:
-    each = jnp.ones((pushes, bodies))
-    nowhere = jnp.zeros((pushes, 0))
-    return Still(each, each, each, jnp.ones(pushes), nowhere, nowhere)
+    each, place = jnp.ones((pushes, bodies)), jnp.ones((pushes, 2))
+    return Still(each, each, each, jnp.ones(pushes), place, place)
 
 
 def all_finite(figures: dict, *, but: tuple[str, ...] = ()) -> bool:

@@ -32,7 +32,7 @@ class Rest(AbstractDynamics):
     def begin(self, scene, state):
         return state
 
-    def advance(self, scene, carry, controls):
+    def advance(self, scene, carry, controls, simulated=None):
         def repeat(x):
             return jnp.repeat(x[:, None], controls.steps, axis=1)
 

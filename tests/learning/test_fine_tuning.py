@@ -23,6 +23,7 @@ from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import predict
 from sainet.models.frame import push_frame
+from sainet.models.integrators import RelaxingResidual
 from sainet.models.registry import load_dynamics
 from sainet.runs.documents import write_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
@@ -91,8 +92,8 @@ def test_a_network_learns_to_see_the_place(store, start, tmp_path):
     fit("in", store, seeing, out, start_from=str(start / "in"))
     network, card = load_network(out)
     assert card.features == "place"
-    assert network.sizes.place
-    known = load_network(start / "in")[0].sizes.body
+    assert network.features.has_place
+    known = load_network(start / "in")[0].features.body_size
     assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
     with pytest.raises(BadCheckpoint, match="give `features` place, too"):
         fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
@@ -114,7 +115,8 @@ def test_a_network_that_starts_from_the_engine_goes_on_adding_to_it(store, tmp_p
     first, on = tmp_path / "first", tmp_path / "on"
     fit("sain", store, TUNING, first, start_from="engine")
     network, card = load_network(first)
-    assert (network.residual, card.residual, card.started_from) == (True, True, None)
+    assert network.integrator == RelaxingResidual()
+    assert (card.residual, card.started_from) == (True, None)
     assert np.abs(network.dyn.weights[-1]).max() > 0  # it has learned something
     task = Task("sain", store, TUNING, PLANAR, from_engine=True)
     silent = begin(task)[0].network
@@ -127,7 +129,7 @@ def test_a_network_that_starts_from_the_engine_goes_on_adding_to_it(store, tmp_p
     )
     seeing = replace(TUNING, features="place")
     fit("sain", store, seeing, on, start_from=str(first))
-    assert load_network(on)[0].residual
+    assert load_network(on)[0].integrator == RelaxingResidual()
     assert read_card(on).started_from == card.weights
     with pytest.raises(RunConflict, match="start_from"):
         fit("sain", store, TUNING, first)

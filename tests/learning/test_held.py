@@ -16,12 +16,11 @@ from sainet.learning.batch import predict_batch
 from sainet.learning.config import FitConfig
 from sainet.learning.held import unroll_held
 from sainet.learning.statistics import feature_scales
-from sainet.models.dynamics import LearnedCarry, predict_motion
+from sainet.models.correctors.base import Start
 from sainet.models.frame import push_frame
-from sainet.models.relaxation import gains, relaxation
+from sainet.models.integrators import RelaxingResidual
 from sainet.runs.errors import BadInput
 from sainet.scenes.scene import TIME_STEP
-from sainet.scenes.state import pack_motion
 
 STEPS = 30
 
@@ -55,14 +54,12 @@ def constant(of):
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_what_is_held_for_a_single_step_is_not_held(residual, bodies):
     batch = batch_of(bodies)
-    carry = LearnedCarry(batch.initial, push_frame(batch.scene, batch.initial))
-    found = predict_motion(
-        residual,
+    frame = push_frame(batch.scene, batch.initial)
+    found = residual.in_frame(
         batch.scene,
-        carry,
+        Start(batch.initial, frame, batch.initial),
         batch.controls,
-        simulated_start=pack_motion(batch.initial),
-        simulated=batch.simulated,
+        batch.simulated,
         unroll=partial(unroll_held, hold=1),
     )
     np.testing.assert_allclose(found, predicted(residual, batch, 1), atol=2e-6)
@@ -91,10 +88,11 @@ def test_networks_of_the_papers_form_are_never_held():
 
 @pytest.mark.parametrize("held", [True, False])
 def test_the_gains_are_those_of_step_after_step(held):
-    gain, change = gains(TIME_STEP, 50), float(held)
+    form, change = RelaxingResidual(), float(held)
+    gain = form.gains(TIME_STEP, 50)
     pose, rate, poses, rates = 0.0, 1.0 - change, [], []
     for _ in range(50):
-        rate = relaxation(TIME_STEP) * rate + TIME_STEP * change
+        rate = form.kept(TIME_STEP) * rate + TIME_STEP * change
         pose += TIME_STEP * rate
         rates.append(rate)
         poses.append(pose)
@@ -109,7 +107,7 @@ def test_what_a_residual_network_says_is_measured_by_the_engines_error(residual)
     batch = replace(
         batch, pose_observed=jnp.asarray(last), rate_observed=jnp.asarray(last & False)
     )
-    scales = feature_scales(batch, residual.sizes, residual=True)
+    scales = feature_scales(batch, residual.features, residual.integrator)
     one = (jnp.zeros_like(residual.dyn.weights[-1]), jnp.ones(3))
     said = eqx.tree_at(lambda n: (n.dyn.weights[-1], n.dyn.biases[-1]), residual, one)
     said = eqx.tree_at(lambda n: n.scales, said, scales)

@@ -223,7 +223,7 @@ def spread(values, constant):
 
 def test_scales_are_the_statistics_of_what_networks_see():
     batch = batch_of()
-    scales = feature_scales(batch, network("sain", "robot").sizes)
+    scales = feature_scales(batch, network("sain", "robot").features)
     pairs, bodies = seen_by_networks(batch)
     mean, deviation = spread(pairs, 1e-9)
     np.testing.assert_allclose(scales.pair_mean, mean, rtol=1e-3, atol=2e-6)
@@ -239,14 +239,14 @@ def test_a_property_that_never_varies_is_not_divided_by_rounding():
         return arrays | {"mass": 0.8937 * alike, "radius": 0.0525 * alike}
 
     batch = batch_of(change=of_one_disk)
-    scales = feature_scales(batch, network("sain", "robot").sizes)
+    scales = feature_scales(batch, network("sain", "robot").features)
     assert scales.body_deviation[-2:].tolist() == [1, 1]
     assert scales.pair_deviation[-4:].tolist() == [1, 1, 1, 1]
 
 
 def test_the_scale_of_accelerations_is_theirs_and_the_same_for_x_and_y():
     batch = batch_of()
-    scales = feature_scales(batch, network("sain", "robot").sizes)
+    scales = feature_scales(batch, network("sain", "robot").features)
     rates = np.asarray(batch.truth[..., 3:], np.float64)
     steps = np.diff(rates, axis=1, prepend=0) * 240
     size = np.sqrt((steps**2).mean((0, 1, 2)))
@@ -289,7 +289,7 @@ def still(arrays):
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_statistics_are_finite_whatever_the_pushes_lack(change, bodies):
     batch = batch_of(change=change, bodies=bodies)
-    scales = feature_scales(batch, network("sain", "robot").sizes)
+    scales = feature_scales(batch, network("sain", "robot").features)
     found = (scales, loss_weights(batch, FitConfig()))
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
 

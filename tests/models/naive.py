@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sainet.models.integrators import RelaxingResidual
 from sainet.scenes.controls import PathControls
 
 BOUND = 4.0  # standard deviations, that a feature is bent to
@@ -189,7 +190,7 @@ def accelerations(network, local, motion, simulated_step, step: int) -> np.ndarr
             seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
             effect += layers(network.rel, seen)
         seen = body_inputs(local, motion, pose_step, step, i)
-        if network.sizes.place:
+        if network.features.has_place:
             seen = np.concatenate([seen, place_inputs(local, motion, i)])
         seen = bounded(seen, scales.body_mean, scales.body_deviation)
         out = layers(network.dyn, np.concatenate([seen, effect]))
@@ -213,7 +214,7 @@ def rollout(network, push_batch, simulated, push: int) -> np.ndarray:
             simulated_step, before = after - before, after
         change = accelerations(network, local, motion, simulated_step, step)
         rate = motion[:, 3:6]
-        if network.residual:
+        if network.integrator == RelaxingResidual():
             engine = simulated_step[:, :3] / network.time_step
             fading = np.exp(-network.time_step / 0.1)
             rate = engine + fading * (rate - engine + simulated_step[:, 3:])

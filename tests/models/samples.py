@@ -11,14 +11,15 @@ from contracts.worlds import engine, pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.engines.assumed import PAPER_MASS, PAPER_RADIUS, AssumedProperties
 from sainet.engines.base import AbstractEngine
+from sainet.models.correctors.interaction import InteractionNetwork, Scales
 from sainet.models.dynamics import (
     AbstractDynamics,
     LearnedDynamics,
     PhysicsDynamics,
     SimulatorAugmented,
 )
-from sainet.models.features import FeatureSizes
-from sainet.models.interaction import InteractionNetwork, Scales
+from sainet.models.features import feature_set
+from sainet.models.integrators import Acceleration, RelaxingResidual
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, Trajectory
@@ -37,20 +38,20 @@ def network(
     residual: bool = False,
 ) -> InteractionNetwork:
     """An untrained network with scales that matter and effects that are large."""
-    sizes = FeatureSizes(kind, model == "sain", place)
+    features = feature_set(kind, simulator=model == "sain", place=place)
     rng = np.random.default_rng(seed)
 
     def drawn(low, high, size):
         return jnp.asarray(rng.uniform(low, high, size), jnp.float32)
 
     scales = Scales(
-        pair_mean=drawn(-0.1, 0.1, sizes.pair),
-        pair_deviation=drawn(0.1, 0.3, sizes.pair),
-        body_mean=drawn(-0.1, 0.1, sizes.body),
-        body_deviation=drawn(0.1, 0.3, sizes.body),
+        pair_mean=drawn(-0.1, 0.1, features.pair_size),
+        pair_deviation=drawn(0.1, 0.3, features.pair_size),
+        body_mean=drawn(-0.1, 0.1, features.body_size),
+        body_deviation=drawn(0.1, 0.3, features.body_size),
         acceleration=jnp.array([3.0, 3.0, 30.0]),
     )
-    if sizes.augmented:  # how far a disk moves and turns in one step, after v_i
+    if features.has_simulator:  # how far a disk moves and turns in one step, after v_i
         step = jnp.array([5e-4, 5e-4, 2e-2])
         deviation = scales.body_deviation.at[3:6].set(step)
         shown = (scales.body_mean.at[3:6].set(0), deviation)
@@ -58,9 +59,13 @@ def network(
         scales = eqx.tree_at(where, scales, shown)
     key = jax.random.key(seed)
     made = InteractionNetwork(
-        sizes, time_step=TIME_STEP, key=key, scales=scales, residual=residual
+        features,
+        time_step=TIME_STEP,
+        key=key,
+        scales=scales,
+        integrator=RelaxingResidual() if residual else Acceleration(),
     )
-    if residual:  # it says nothing yet: it is to say what another one does
+    if residual:  # its output is zero: give it the last layer of another network
         made = eqx.tree_at(lambda n: n.dyn, made, network(model, kind, seed).dyn)
         return made
     layers, larger = (lambda n: (n.rel, n.dyn)), lambda w: 1.5 * w

@@ -17,15 +17,17 @@ from models.samples import (
     pushes,
     quick_dynamics,
 )
+from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
-from sainet.models.features import FeatureSizes, in_columns, near_pairs, still_features
+from sainet.models.features import feature_set
 from sainet.models.frame import (
     controls_to_frame,
     motion_from_frame,
     motion_to_frame,
     push_frame,
 )
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.inputs import in_columns, near_pairs, still_features
+from sainet.models.integrators import RelaxingResidual
 from sainet.models.widen import widen
 from sainet.scenes.controls import path_controls
 from sainet.scenes.pushes import Push
@@ -80,8 +82,10 @@ def test_the_residual_form_adds_the_engines_steps(kind, bodies):
 @every_kind
 def test_a_residual_network_that_has_learned_nothing_is_the_engine(kind):
     batch = moving_pushes(kind, 2)
-    sizes, key = FeatureSizes(kind, augmented=True), jax.random.key(0)
-    silent = InteractionNetwork(sizes, time_step=TIME_STEP, key=key, residual=True)
+    features, key = feature_set(kind, simulator=True), jax.random.key(0)
+    silent = InteractionNetwork(
+        features, time_step=TIME_STEP, key=key, integrator=RelaxingResidual()
+    )
     inside = assumed([0, 1])
     found = pack_motion(predict(SimulatorAugmented(silent, inside), *batch).states)
     wanted = pack_motion(predict(PhysicsDynamics(inside), *batch).states)
@@ -111,13 +115,13 @@ def test_a_widened_network_says_the_same_until_it_learns(model):
     made = quick_dynamics(model, "robot")
     scales = network(model, "robot", seed=3, place=True).scales
     wide = eqx.tree_at(lambda d: d.network, made, widen(made.network, scales))
-    assert wide.network.sizes == network(model, "robot", place=True).sizes
+    assert wide.network.features == network(model, "robot", place=True).features
     plain, found = (predict(d, *batch).states for d in (made, wide))
     np.testing.assert_allclose(found.position, plain.position, atol=1e-7)
     np.testing.assert_allclose(found.angle, plain.angle, atol=1e-6)
     # The new weights count as soon as they are not zero.
     first = lambda d: d.network.dyn.weights[0]  # noqa: E731
-    known = made.network.sizes.body
+    known = made.network.features.body_size
     loud = eqx.tree_at(first, wide, first(wide).at[known : known + 6].set(1.0))
     moved = predict(loud, *batch).states.position - plain.position
     assert np.abs(np.asarray(moved)).max() > 1e-5
@@ -149,9 +153,7 @@ def test_near_pairs_are_those_whose_gap_is_within_reach():
     scene = make_scene(np.ones((1, 4)), [[0.05, 0.05, 0.05, 0.05]])
     place = jnp.stack([jnp.array(x), jnp.zeros(4)], axis=-1)[None]
     state = at_rest(place, jnp.zeros((1, 4)), jnp.full((1, 2), -1.0))
-    still = still_features(
-        scene, push_frame(scene, state), FeatureSizes("robot", False)
-    )
+    still = still_features(scene, push_frame(scene, state))
     found = near_pairs(in_columns(pack_motion(state)), in_columns(still), 0.0205)
     gaps = np.asarray(pair_gaps(scene, state))[0]
     wanted = [[gaps[i, (i + k) % 4] <= 0.0205 for i in range(4)] for k in (1, 2, 3)]

@@ -14,9 +14,9 @@ import numpy as np
 from sainet.bench.problem import Problem
 from sainet.learning.batch import path_to_frame, to_target
 from sainet.models.bounded import GRADIENT_BOUND, GRADIENT_SIZES
-from sainet.models.features import drives, still_features
+from sainet.models.correctors.interaction import FEATURE_BOUND
 from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
-from sainet.models.interaction import FEATURE_BOUND
+from sainet.models.inputs import drives, still_features
 from sainet.runs.errors import SainetError
 from sainet.scenes.state import pack_motion
 
@@ -105,7 +105,7 @@ def _batch_arrays(problem: Problem) -> dict[str, Any]:
     size, whole = problem.config.batch_size, problem.batch
     if whole.simulated is None:
         raise ValueError("a batch for SAIN holds s-bar")
-    frame, sizes = push_frame(whole.scene, whole.initial), problem.state.network.sizes
+    frame = push_frame(whole.scene, whole.initial)
     initial = motion_to_frame(pack_motion(whole.initial), frame)
     simulated = path_to_frame(whole.simulated, frame).swapaxes(0, 1)
     drive = drives(controls_to_frame(whole.controls, frame), initial, simulated)
@@ -113,7 +113,7 @@ def _batch_arrays(problem: Problem) -> dict[str, Any]:
     arrays = {
         "initial": initial,
         **drive._asdict(),
-        **still_features(whole.scene, frame, sizes)._asdict(),
+        **still_features(whole.scene, frame)._asdict(),
         "pose": target.pose.swapaxes(0, 1),
         "rate": target.rate.swapaxes(0, 1),
     }

@@ -11,8 +11,8 @@ from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights
 from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import FitState, even_batch, first_state
-from sainet.models.features import FeatureSizes
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.features import feature_set
 
 
 class Problem(NamedTuple):
@@ -36,12 +36,12 @@ def make_problem(pushes: int = 100, steps: int = 200) -> Problem:
     arrays = simulate_chunk(data, 0)
     batch = to_batch(arrays, info, steps=steps, simulated=data.assumed_engine[0])
     config = FitConfig(batch_size=pushes, steps=steps)
-    sizes = FeatureSizes(info.kind, augmented=True)
+    features = feature_set(info.kind, simulator=True)
     network = InteractionNetwork(
-        sizes,
+        features,
         time_step=info.time_step,
         key=jax.random.key(config.seed),
-        scales=feature_scales(batch, sizes),
+        scales=feature_scales(batch, features),
     )
     weights = loss_weights(batch, config)
     return Problem(config, first_state(network, config), weights, even_batch(batch))

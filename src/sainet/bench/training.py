@@ -17,7 +17,7 @@ from sainet.bench.peer import TorchPeer, missing_torch, save_problem
 from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import check_runs, median_seconds
 from sainet.learning.step import make_step
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
 
 _FORWARD_AND_BACK = 3  # a product's two gradients are two products of its size
 _log = logging.getLogger(__name__)

@@ -1,4 +1,4 @@
-"""A stored batch as a network trains on it: everything in the push frame."""
+"""Stored batches as training uses them: predictions and targets in the push frame."""
 
 from functools import partial
 
@@ -9,10 +9,10 @@ from jaxtyping import Array, Float
 from sainet.datasets.batch import PushBatch
 from sainet.learning.held import unroll_held
 from sainet.learning.loss import Target
-from sainet.models.dynamics import LearnedCarry, predict_motion
+from sainet.models.correctors.base import Start
+from sainet.models.correctors.interaction import InteractionNetwork, unroll
 from sainet.models.frame import PushFrame, motion_to_frame, push_frame
-from sainet.models.interaction import InteractionNetwork, unroll
-from sainet.scenes.state import pack_motion
+from sainet.models.integrators import RelaxingResidual
 
 
 def predict_batch(
@@ -22,26 +22,23 @@ def predict_batch(
 
     Args:
         network: IN or SAIN.
-        batch: of pushes, with s-bar if it is SAIN.
-        hold: steps over which what a residual network says is held.
+        batch: of pushes, with s-bar for SAIN.
+        hold: length of the zero-order hold of an additive network (steps).
     """
-    is_held = network.residual and hold > 1
-    carry = LearnedCarry(batch.initial, push_frame(batch.scene, batch.initial))
-    start = pack_motion(batch.initial) if network.sizes.augmented else None
-    simulated = batch.simulated if network.sizes.augmented else None
-    return predict_motion(
-        network,
+    is_held = isinstance(network.integrator, RelaxingResidual) and hold > 1
+    initial, has_simulator = batch.initial, network.features.has_simulator
+    frame = push_frame(batch.scene, initial)
+    return network.in_frame(
         batch.scene,
-        carry,
+        Start(initial, frame, initial if has_simulator else None),
         batch.controls,
-        simulated_start=start,
-        simulated=simulated,
+        batch.simulated if has_simulator else None,
         unroll=partial(unroll_held, hold=hold) if is_held else unroll,
     )
 
 
 def to_target(batch: PushBatch) -> Target:
-    """Return what was observed: measured poses, velocities of the truth."""
+    """Return the observed motion: measured poses, velocities of the ground truth."""
     frame = push_frame(batch.scene, batch.initial)
     motion = jnp.concatenate([batch.measured, batch.truth[..., 3:6]], axis=-1)
     local = path_to_frame(motion, frame)

@@ -30,7 +30,8 @@ from sainet.learning.task import FROM_ENGINE, Start, Task, begin, check_data, se
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_network
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.integrators import RelaxingResidual
 from sainet.models.registry import SHIPPED, network_folder
 from sainet.runs.documents import content_hash, read_json, write_json
 from sainet.runs.errors import Diverged, UnknownName
@@ -240,7 +241,7 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         started_from=task.start.card.weights if task.start else None,
         earlier_seeds=task.start.card.data_seeds if task.start else [],
         recurrent=task.config.recurrent,
-        residual=progress.network.residual,
+        residual=isinstance(progress.network.integrator, RelaxingResidual),
         final_loss=history[-1]["loss"] if history else None,
     )
     write_json(folder.path / CARD, card.to_dict())

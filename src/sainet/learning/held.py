@@ -1,9 +1,9 @@
-"""Training the residual form on long strokes: what the network says is held.
+"""Zero-order hold: training additive networks on long pushes.
 
-What a residual network adds to the engine is small and changes slowly, while a stroke
-has a thousand steps. In training it is asked every few steps only, and what it says
-holds until it is asked again; the motion that follows from that is exact. Networks that
-say the whole motion cannot be held: they brake and kick within a step.
+The output of an additive network is small and changes slowly, while a long push has a
+thousand steps. Training computes it every few steps and reuses it in between; the
+motion that follows from the held output is exact. The paper's networks predict the
+whole motion and cannot be held: they brake and kick within a step.
 """
 
 from typing import Any
@@ -15,9 +15,9 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from sainet.models.bounded import bound_gradient
-from sainet.models.features import Drive, Still, in_columns
-from sainet.models.interaction import InteractionNetwork
-from sainet.models.relaxation import Gains, gains
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.inputs import Drive, Moment, Still, in_columns
+from sainet.models.integrators import Gains, RelaxingResidual
 
 
 def unroll_held(
@@ -28,30 +28,32 @@ def unroll_held(
     *,
     hold: int,
 ) -> Float[Array, "time push body 6"]:
-    """Predict like `unroll`, asking a residual network every few steps.
+    """Predict like `unroll`, applying an additive network every few steps.
 
     Args:
-        network: of the residual form.
+        network: additive.
         initial: packed motion at the start, of engine and network alike.
         still: for each push.
         drive: with axes ``[push, time, ...]``.
-        hold: steps over which f_dyn is held; 1 is what `unroll` does.
+        hold: steps over which f_dyn is held; 1 equals `unroll`.
     """
+    integrator = network.integrator
+    assert isinstance(integrator, RelaxingResidual)
     simulated = _simulated(initial, drive)
-    still, gain = in_columns(still), gains(network.time_step, hold)
-    asked = jax.vmap(in_columns)(_time_first(_each(drive, hold)))
+    still, gain = in_columns(still), integrator.gains(network.time_step, hold)
+    held = jax.vmap(in_columns)(_time_first(_each(drive, hold)))
     before = jax.vmap(in_columns)(_time_first(simulated[:, :-1:hold]))
 
     @jax.checkpoint
     def body(deviation: Array, now: tuple[Array, Drive]) -> tuple[Array, Array]:
-        engine, seen = now
+        engine, drive = now
         deviation = bound_gradient(deviation)
-        change = network.acceleration(engine + deviation, still, seen)
+        change = network.acceleration(Moment(engine + deviation, still, drive))
         path = _held(deviation, change, gain)
         return path[-1], path
 
     nothing = jnp.zeros_like(before[0])
-    path = lax.scan(body, nothing, (before, asked))[1]  # [block, step, 6, body, push]
+    path = lax.scan(body, nothing, (before, held))[1]  # [block, step, 6, body, push]
     steps = simulated.shape[1] - 1
     deviation = jax.vmap(in_columns)(path.reshape(-1, *path.shape[2:])[:steps])
     return _time_first(simulated[:, 1:]) + deviation
@@ -62,7 +64,7 @@ def _held(
     change: Float[Array, "3 body push"],
     gain: Gains,
 ) -> Float[Array, "step 6 body push"]:
-    """Return the deviation after each step for which the change is held."""
+    """Return the deviation after each step over which the change is held."""
 
     def each(numbers: np.ndarray, x: Array) -> Array:
         return jnp.asarray(numbers, x.dtype)[:, None, None, None] * x[None]
@@ -79,22 +81,27 @@ def _simulated(
     initial: Float[Array, "push body 6"], drive: Drive
 ) -> Float[Array, "push state body 6"]:
     """Return s-bar, packed, from the start on."""
-    step = jnp.concatenate([drive.simulated_pose_step, drive.simulated_rate_step], -1)
+    step = jnp.concatenate(_steps(drive), axis=-1)
     return jnp.cumsum(jnp.concatenate([initial[:, None], step], axis=1), axis=1)
 
 
 def _each(drive: Drive, hold: int) -> Drive:
-    """Return what the network is shown whenever it is asked.
+    """Return the inputs of the network at each of its applications.
 
-    The command is that of the first step; the engine's step is the mean over those to
-    come, for contact kicks in one alone.
+    The command is that of the first step; the engine's step is the mean over the hold,
+    because contact kicks within a single step.
     """
-    return Drive(
-        drive.action[:, ::hold],
-        drive.pusher[:, ::hold],
-        _mean(drive.simulated_pose_step, hold),
-        _mean(drive.simulated_rate_step, hold),
-    )
+    pusher = None if drive.pusher is None else drive.pusher[:, ::hold]
+    means = (_mean(step, hold) for step in _steps(drive))
+    return Drive(drive.action[:, ::hold], pusher, *means)
+
+
+def _steps(drive: Drive) -> tuple[Array, Array]:
+    """Return the steps of the simulated pose and rate."""
+    pose, rate = drive.simulated_pose_step, drive.simulated_rate_step
+    assert pose is not None
+    assert rate is not None
+    return pose, rate
 
 
 def _mean(

@@ -1,5 +1,7 @@
 """Scales of features, outputs and loss terms, from the training data."""
 
+from collections.abc import Callable
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,17 +11,11 @@ from sainet.datasets.batch import PushBatch
 from sainet.learning.batch import path_to_frame
 from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights
-from sainet.models.features import (
-    FeatureSizes,
-    body_features,
-    drives,
-    in_columns,
-    pair_features,
-    still_features,
-)
+from sainet.models.correctors.interaction import Scales
+from sainet.models.features import FeatureSet
 from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
-from sainet.models.interaction import Scales
-from sainet.models.relaxation import gains
+from sainet.models.inputs import Drive, Moment, drives, in_columns, still_features
+from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.scenes.state import pack_motion
 
 # A deviation below this, or this share of the mean, is rounding: nothing varies.
@@ -29,34 +25,43 @@ _STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is roun
 
 @eqx.filter_jit
 def feature_scales(
-    batch: PushBatch, sizes: FeatureSizes, *, residual: bool = False
+    batch: PushBatch,
+    features: FeatureSet,
+    integrator: Integrator = Acceleration(),  # noqa: B008
 ) -> Scales:
-    """Return means and deviations of what a network sees along the true paths.
+    """Return means and deviations of a network's inputs along the true paths.
 
-    What it says is measured by how the bodies accelerate, or, if it is added to the
-    engine's motion, by what corrects the engine.
+    The scale of its output is the acceleration of the bodies or, for an additive
+    network, the acceleration that corrects the engine.
     """
     frame = push_frame(batch.scene, batch.initial)
     motion = path_to_frame(_known_motion(batch), frame)
     start = motion_to_frame(pack_motion(batch.initial), frame)
     before = jnp.concatenate([start[None], motion[:-1]])
     simulated = None
-    if sizes.augmented and batch.simulated is not None:
+    if features.has_simulator and batch.simulated is not None:
         simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
     drive = drives(controls_to_frame(batch.controls, frame), start, simulated)
     drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    still = in_columns(still_features(batch.scene, frame, sizes))
+    still = in_columns(still_features(batch.scene, frame))
     columns = jax.vmap(in_columns)((before, drive))
-    over_time = jax.vmap(lambda now: body_features(now[0], still, now[1]), out_axes=1)
-    body_mean, body_deviation = _spread(over_time(columns))
+
+    def spread(inputs: Callable[[Moment], Array]) -> tuple[Array, Array]:
+        def at(now: tuple[Array, Drive]) -> Array:
+            return inputs(Moment(now[0], still, now[1]))
+
+        return _spread(jax.vmap(at, out_axes=1)(columns))
+
+    body_mean, body_deviation = spread(features.of_bodies)
     if batch.scene.body_count > 1:
-        pairs = jax.vmap(lambda now: pair_features(now[0], still, now[1]), out_axes=1)
-        pair_mean, pair_deviation = _spread(pairs(columns))
+        pair_mean, pair_deviation = spread(features.of_pairs)
     else:
-        pair_mean, pair_deviation = jnp.zeros(sizes.pair), jnp.ones(sizes.pair)
+        size = features.pair_size
+        pair_mean, pair_deviation = jnp.zeros(size), jnp.ones(size)
     change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
     size = jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
-    size = _correction(batch) if residual else size
+    if isinstance(integrator, RelaxingResidual):
+        size = _correction(batch, integrator)
     return Scales(
         pair_mean=pair_mean,
         pair_deviation=pair_deviation,
@@ -116,14 +121,15 @@ def _errors(batch: PushBatch) -> tuple[Array, Array]:
     )
 
 
-def _correction(batch: PushBatch) -> Array:
-    """Return the acceleration that, held, makes an error as large as s-bar's is.
+def _correction(batch: PushBatch, integrator: RelaxingResidual) -> Array:
+    """Return the constant acceleration that deviates as far as s-bar errs.
 
-    By mean absolute errors, which failed recordings do not rule: of x and y (m/s^2) and
-    of the angle (rad/s^2).
+    By mean absolute errors, which failed recordings do not dominate: of x and y (m/s^2)
+    and of the angle (rad/s^2).
     """
     pose, _ = _errors(batch)
-    gain = jnp.asarray(gains(batch.scene.time_step, pose.shape[1]).pose_of_change)
+    gains = integrator.gains(batch.scene.time_step, pose.shape[1])
+    gain = jnp.asarray(gains.pose_of_change)
     reached = jnp.where(jnp.isnan(pose), jnp.nan, gain[:, None, None])
     size = jnp.nanmean(jnp.abs(pose), axis=(0, 1, 2))
     return _nonzero(size / jnp.nanmean(reached, axis=(0, 1, 2)))

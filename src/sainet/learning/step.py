@@ -18,7 +18,7 @@ from sainet.engines.devices import BATCH, batch_mesh
 from sainet.learning.batch import predict_batch, to_target
 from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights, push_losses
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
 
 _MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
 _CHUNK = 500  # pushes at a time: those of single steps are 20,000, and leave the cache

@@ -21,8 +21,9 @@ from sainet.learning.split import split
 from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import FitState, first_state
 from sainet.models.card import CARD, Card
-from sainet.models.features import FeatureSizes
-from sainet.models.interaction import InteractionNetwork, Scales
+from sainet.models.correctors.interaction import InteractionNetwork, Scales
+from sainet.models.features import FeatureSet, feature_set
+from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.models.widen import widen
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 
@@ -79,10 +80,18 @@ class Task:
         return (*kept, simulated_name(self.assumed.name))
 
     @property
-    def sizes(self) -> FeatureSizes:
-        """What the network sees."""
-        place = self.config.features == "place"
-        return FeatureSizes(self.store.info.kind, self.model == "sain", place)
+    def features(self) -> FeatureSet:
+        """The inputs of the network."""
+        return feature_set(
+            self.store.info.kind,
+            simulator=self.model == "sain",
+            place=self.config.features == "place",
+        )
+
+    @property
+    def integrator(self) -> Integrator:
+        """The integrator of a new network."""
+        return RelaxingResidual() if self.from_engine else Acceleration()
 
     @cached_property
     def training(self) -> Store:
@@ -249,7 +258,7 @@ def begin(task: Task) -> tuple[FitState, LossWeights]:
     store, config = task.training, task.config
     few = slice(0, min(_STATISTICS_PUSHES, store.info.pushes))
     sample = task.to_sample(store.read(few, task.names))
-    scales = feature_scales(sample, task.sizes, residual=task.from_engine)
+    scales = feature_scales(sample, task.features, task.integrator)
     network = _first_network(task, scales)
     return first_state(network, config), loss_weights(sample, config)
 
@@ -257,11 +266,11 @@ def begin(task: Task) -> tuple[FitState, LossWeights]:
 def _first_network(task: Task, scales: Scales) -> InteractionNetwork:
     if task.start is None:
         return InteractionNetwork(
-            task.sizes,
+            task.features,
             time_step=task.store.info.time_step,
             key=jax.random.key(task.config.seed),
             scales=scales,
-            residual=task.from_engine,
+            integrator=task.integrator,
         )
     network = task.start.network
-    return widen(network, scales) if task.sizes != network.sizes else network
+    return widen(network, scales) if task.features != network.features else network

@@ -1,4 +1,4 @@
-"""Bound what flows back through time, so that 200 steps of contact cannot explode."""
+"""Bounds on gradients through time: over 200 steps of contact they would explode."""
 
 import jax
 import jax.numpy as jnp
@@ -27,7 +27,7 @@ def _forward(motion: Array) -> tuple[Array, None]:
 def _backward(_: None, gradient: Array) -> tuple[Array]:
     sizes = jnp.array(GRADIENT_SIZES, gradient.dtype)[:, None, None]
     squared = jnp.sum((gradient * sizes) ** 2, axis=(0, 1), keepdims=True)
-    # An overflow is worth nothing: its direction is lost as well.
+    # An overflow counts as zero: its direction is lost as well.
     share = jnp.minimum(
         1.0, GRADIENT_BOUND * jax.lax.rsqrt(jnp.maximum(squared, 1e-30))
     )

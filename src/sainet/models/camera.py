@@ -8,7 +8,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sainet.engines.identified import camera_offset
-from sainet.models.dynamics import AbstractDynamics, Purpose
+from sainet.models.correctors.base import Purpose
+from sainet.models.dynamics import AbstractDynamics
 from sainet.scenes.controls import Controls, move_controls, move_pusher
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -44,10 +45,11 @@ class OffsetCamera(AbstractDynamics):
         scene: Scene,
         carry: Any,  # noqa: ANN401
         controls: Controls,
+        simulated: Trajectory | None = None,
     ) -> tuple[Any, Trajectory]:
         """Advance the wrapped model."""
         seen = move_controls(controls, self._offset)
-        carry, trajectory = self.dynamics.advance(scene, carry, seen)
+        carry, trajectory = self.dynamics.advance(scene, carry, seen, simulated)
         return carry, Trajectory(move_pusher(trajectory.states, -self._offset))
 
     @property

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sainet.models.features import ACTION_SIZE, FEATURES
+from sainet.models.features import ACTIONS, FEATURES
 from sainet.runs.documents import is_number
 from sainet.runs.errors import BadCheckpoint
 
@@ -33,7 +33,7 @@ def _is(kind: type) -> Callable[[Any], bool]:
 
 _FIELDS: dict[str, _Check] = {
     "model": (lambda v: v in ("in", "sain"), "'in' or 'sain'"),
-    "kind": (lambda v: v in tuple(ACTION_SIZE), "one of " + ", ".join(ACTION_SIZE)),
+    "kind": (lambda v: v in tuple(ACTIONS), "one of " + ", ".join(ACTIONS)),
     "time_step": (
         lambda v: isinstance(v, float) and 0 < v < 1,
         "in seconds, between 0 and 1",

@@ -7,8 +7,9 @@ import jax
 
 from sainet.models.arrays import load_arrays
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
-from sainet.models.features import FeatureSizes
-from sainet.models.interaction import InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.features import FeatureSet, feature_set
+from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import BadCheckpoint
 
@@ -21,8 +22,9 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
     """
     card = read_card(folder)
     augmented, place = card.model == "sain", card.features == "place"
-    sizes = FeatureSizes(card.kind, augmented, place)
-    network = untrained(sizes, card.time_step, residual=card.residual)
+    features = feature_set(card.kind, simulator=augmented, place=place)
+    integrator = RelaxingResidual() if card.residual else Acceleration()
+    network = untrained(features, card.time_step, integrator)
     loaded = load_arrays(folder / WEIGHTS, network)
     if content_hash((folder / WEIGHTS).read_bytes()) != card.weights:
         raise BadCheckpoint(
@@ -33,13 +35,16 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
 
 
 def untrained(
-    sizes: FeatureSizes, time_step: float, *, residual: bool
+    features: FeatureSet, time_step: float, integrator: Integrator
 ) -> InteractionNetwork:
-    """Return a network of shapes instead of arrays: drawing those takes seconds."""
+    """Return a network of shapes instead of arrays: drawing arrays takes seconds."""
 
     def make() -> InteractionNetwork:
         return InteractionNetwork(
-            sizes, time_step=time_step, key=jax.random.key(0), residual=residual
+            features,
+            time_step=time_step,
+            key=jax.random.key(0),
+            integrator=integrator,
         )
 
     return eqx.filter_eval_shape(make)

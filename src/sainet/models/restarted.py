@@ -1,10 +1,11 @@
-"""The non-recurrent form (the paper's figure 2c): a model of a single step."""
+"""The non-recurrent form (the paper's figure 2c): a model of single steps."""
 
 import jax
 import jax.numpy as jnp
 from jax import lax
 
-from sainet.models.dynamics import AbstractDynamics, Purpose
+from sainet.models.correctors.base import Purpose
+from sainet.models.dynamics import AbstractDynamics
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import Controls, PathControls
 from sainet.scenes.scene import Scene
@@ -14,33 +15,38 @@ from sainet.scenes.state import State, Trajectory
 class Restarted(AbstractDynamics):
     """Restarts a model, engine and push frame, from its own prediction at every step.
 
-    Only for a pusher that follows a path: where a force drives it, no model but the
-    engine knows where it is when the next step begins.
+    Only for a pusher that follows a path: where a force drives it, only an engine
+    predicts its position at the start of the next step.
     """
 
     model: AbstractDynamics
 
     @property
     def made_for(self) -> Purpose | None:
-        """What the network in the model was made for."""
+        """The pushes that the model's network is for."""
         return self.model.made_for
 
     def begin(self, scene: Scene, state: State) -> State:
-        """Start at the state; nothing else is remembered."""
+        """Start at the state."""
         return state
 
     def advance(
-        self, scene: Scene, carry: State, controls: Controls
+        self,
+        scene: Scene,
+        carry: State,
+        controls: Controls,
+        simulated: Trajectory | None = None,
     ) -> tuple[State, Trajectory]:
-        """Apply the model to one step after another.
+        """Apply the model to one step after another; its engine always runs.
 
         Raises:
             BadInput: a force drives the pusher.
         """
+        del simulated  # of a whole push; here the engine restarts at every step
         if not isinstance(controls, PathControls):
             raise BadInput(
-                "A network of single steps predicts pushes of the robot setup alone: "
-                "it cannot know where a pusher is that a force drives."
+                "A network of single steps predicts only pushes of the robot setup: "
+                "the path of a pusher that a force drives is not known in advance."
             )
 
         def step(state: State, control: PathControls) -> tuple[State, State]:

@@ -1,26 +1,25 @@
-"""A network that is shown more than the one that it goes on from."""
-
-from dataclasses import replace
+"""Networks with more features than the network that training continues."""
 
 import equinox as eqx
 import jax.numpy as jnp
 
 from sainet.models.checkpoint import untrained
-from sainet.models.interaction import InteractionNetwork, Scales
+from sainet.models.correctors.interaction import InteractionNetwork, Scales
+from sainet.models.features import FeatureSet, Place
 
 
 def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:
-    """Return a network that also sees the place on the table, and says the same.
+    """Return a network that also takes the place on the table; its output is equal.
 
-    What is new enters the first layer of f_dyn with weights of zero: it has no say
-    until training gives it one.
+    The new features enter the first layer of f_dyn with weights of zero: they have no
+    effect until training changes that.
 
     Args:
-        network: of the paper's features.
-        scales: of the new features, from the data that they are to be learned from;
-            what the network knew already keeps its scales.
+        network: with the paper's features.
+        scales: of the new features, from the training data; the other features keep
+            their scales.
     """
-    known, kept = network.sizes.body, network.scales
+    known, kept = network.features.body_size, network.scales
     weight = network.dyn.weights[0]
     added = scales.body_mean.shape[0] - known
     silent = jnp.zeros((added, weight.shape[1]), weight.dtype)
@@ -29,12 +28,12 @@ def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:
     dyn = eqx.tree_at(lambda layers: layers.weights[0], network.dyn, wider)
     mean = jnp.concatenate([kept.body_mean, scales.body_mean[known:]])
     deviation = jnp.concatenate([kept.body_deviation, scales.body_deviation[known:]])
-    seen = eqx.tree_at(
+    widened = eqx.tree_at(
         lambda s: (s.body_mean, s.body_deviation), kept, (mean, deviation)
     )
-    sizes = replace(network.sizes, place=True)
+    features = FeatureSet((*network.features.blocks, Place()))
     return eqx.tree_at(
         lambda n: (n.rel, n.dyn, n.scales),
-        untrained(sizes, network.time_step, residual=network.residual),
-        (network.rel, dyn, seen),
+        untrained(features, network.time_step, network.integrator),
+        (network.rel, dyn, widened),
     )

@@ -1,0 +1,1 @@
+"""Correctors: they predict motion, with or without a simulator prediction."""

@@ -1,0 +1,115 @@
+"""Quantities that network features are computed from, in the push frame.
+
+The networks read columns: the numbers of a body run along the first axis, the pushes
+along the last. Each number then takes one pass over memory, which makes a training
+iteration some 7 % faster than the reverse does.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from sainet.models.frame import PushFrame
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.scene import Scene
+
+
+class Drive(NamedTuple):
+    """Inputs from outside the network at one step of each push."""
+
+    action: Float[Array, "push action"]  # the part that needs no predicted state
+    pusher: Float[Array, "push 2"] | None  # m, commanded; None where a force drives it
+    # p-bar(t+1) - p-bar(t) and v-bar(t+1) - v-bar(t); None without an engine
+    simulated_pose_step: Float[Array, "push body 3"] | None
+    simulated_rate_step: Float[Array, "push body 3"] | None
+
+
+class Still(NamedTuple):
+    """Properties that stay the same during each push."""
+
+    mass: Float[Array, "push body"]  # kg
+    radius: Float[Array, "push body"]  # m
+    pushed: Float[Array, "push body"]  # 1 for the pushed disk
+    pusher_radius: Float[Array, " push"]  # m
+    origin: Float[Array, "push 2"]  # m, of the push frame on the table
+    heading: Float[Array, "push 2"]  # unit vector of its x axis on the table
+
+
+class Moment(NamedTuple):
+    """Everything that features are computed from at one step, in columns."""
+
+    motion: Float[Array, "6 body push"]
+    still: Still
+    drive: Drive
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of bodies and of pushes."""
+        return self.motion.shape[1], self.motion.shape[2]
+
+
+def in_columns(tree: Any) -> Any:  # noqa: ANN401
+    """Reverse the axes of every array: push, body, number become number, body, push."""
+    return jax.tree.map(jnp.transpose, tree)
+
+
+def near_pairs(
+    motion: Float[Array, "6 body push"], still: Still, reach: float
+) -> Float[Array, "other body push"]:
+    """Return 1 for each pair of `FeatureSet.of_pairs` within reach, 0 for the others.
+
+    Args:
+        motion: packed motion, in columns.
+        still: in columns.
+        reach: m, the widest gap between two surfaces that counts as near.
+    """
+    gaps = []
+    for shift in range(1, motion.shape[1]):
+        offset = motion[0:2] - jnp.roll(motion[0:2], -shift, axis=1)
+        distance = jnp.sqrt(jnp.sum(offset**2, axis=0))
+        gaps.append(distance - still.radius - jnp.roll(still.radius, -shift, axis=0))
+    return (jnp.stack(gaps) <= reach).astype(motion.dtype)
+
+
+def still_features(scene: Scene, frame: PushFrame) -> Still:
+    """Return the properties that stay the same; frictions are not among them."""
+    heading = jnp.stack([jnp.cos(frame.angle), jnp.sin(frame.angle)], axis=-1)
+    return Still(
+        mass=scene.mass,
+        radius=scene.radius,
+        pushed=frame.pushed,
+        pusher_radius=scene.pusher_radius,
+        origin=frame.origin,
+        heading=heading,
+    )
+
+
+def drives(
+    controls: Controls,
+    initial: Float[Array, "*batch body 6"],
+    simulated: Float[Array, "*batch time body 6"] | None,
+) -> Drive:
+    """Return the inputs from outside at every step; all in the push frame.
+
+    Args:
+        controls: of the push.
+        initial: packed motion at which both predictions start.
+        simulated: packed s-bar after each step; None without an engine.
+    """
+    action, pusher = _action(controls)
+    if simulated is None:
+        return Drive(action, pusher, None, None)
+    whole = jnp.concatenate([initial[..., None, :, :], simulated], axis=-3)
+    step = whole[..., 1:, :, :] - whole[..., :-1, :, :]
+    return Drive(action, pusher, step[..., 0:3], step[..., 3:6])
+
+
+def _action(controls: Controls) -> tuple[Array, Array | None]:
+    if isinstance(controls, PathControls):
+        return controls.velocity, controls.position
+    offset = jnp.broadcast_to(
+        controls.contact_offset[..., None, :], controls.force.shape
+    )
+    return jnp.concatenate([controls.force, offset], axis=-1), None
