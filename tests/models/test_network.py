@@ -17,8 +17,14 @@ from models.samples import (
     pushes,
     quick_dynamics,
 )
+from sainet.engines.base import AbstractEngine
 from sainet.models.correctors.interaction import InteractionNetwork
-from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.models.dynamics import (
+    PhysicsDynamics,
+    SimulatorAugmented,
+    predict,
+    stored_prediction,
+)
 from sainet.models.features import feature_set
 from sainet.models.frame import (
     controls_to_frame,
@@ -77,6 +83,26 @@ def test_the_residual_form_adds_the_engines_steps(kind, bodies):
     for push in range(PUSHES):
         wanted = naive.rollout(made.network, batch, simulated, push)
         np.testing.assert_allclose(found[push], wanted, atol=2e-5)
+
+
+class Unavailable(AbstractEngine):
+    """An engine that must not run."""
+
+    def rollout(self, scene, initial, controls):
+        raise AssertionError("the engine ran although its prediction is stored")
+
+
+@every_kind
+def test_a_stored_prediction_replaces_the_engine(kind):
+    batch = moving_pushes(kind, 2)
+    simulated = eqx.filter_jit(Glide().rollout)(*batch)
+    stored = stored_prediction(pack_motion(simulated.states), *batch[1:])
+    net = network("sain", kind)
+    wanted = predict(SimulatorAugmented(net, Glide()), *batch).states
+    found = predict(SimulatorAugmented(net, Unavailable()), *batch, stored).states
+    np.testing.assert_allclose(pack_motion(found), pack_motion(wanted), atol=1e-6)
+    found = predict(PhysicsDynamics(Unavailable()), *batch, stored).states
+    np.testing.assert_array_equal(pack_motion(found), pack_motion(simulated.states))
 
 
 @every_kind
