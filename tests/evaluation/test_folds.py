@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
+from sainet.datasets.splits import fold_of_push, make_folds
 from sainet.evaluation.evaluate import evaluate
-from sainet.evaluation.folds import fold_of_push, join_folds, make_folds
+from sainet.evaluation.folds import join_folds
 from sainet.models.registry import load_dynamics
 
 REPEATS = np.random.default_rng(0).permutation(np.repeat(np.arange(9), 3))

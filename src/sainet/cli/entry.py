@@ -24,6 +24,7 @@ from sainet.cli.messages import message
 from sainet.cli.output import finish
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
+from sainet.cli.split import Split
 from sainet.cli.train import Train, going_on
 from sainet.runs.errors import BadInput, SainetError
 
@@ -31,6 +32,7 @@ _COMMANDS = {
     "demo": Demo,
     "generate": Generate,
     "import": Import,
+    "split": Split,
     "add-bystander": AddBystander,
     "train": Train,
     "evaluate": Evaluate,
@@ -68,7 +70,8 @@ it gets wrong about pushed disks, and measure how much better it became.
 Start with 'sainet demo': the whole method, small, in under three minutes."""
 
 INTERRUPTED = 130
-_GOES_ON = (Demo, Generate, Train, Control, Reproduce)  # from where it was stopped
+# Commands that an identical call resumes.
+_GOES_ON = (Demo, Generate, Import, Split, Train, Control, Reproduce)
 
 
 def parse(words: Sequence[str]) -> Any:  # noqa: ANN401

@@ -21,6 +21,8 @@ class Evaluate:
     of trained ones. Default: physics and the shipped networks that fit the data."""
     data: Path
     """Dataset to predict."""
+    group: str | None = None
+    """Group of pushes to predict (default: all groups)."""
     steps: int | None = None
     """Steps to predict, 0 for all; default: 200, all of recorded pushes."""
     engine: str | None = None
@@ -42,6 +44,7 @@ class Evaluate:
         from sainet.report.tables import print_table
 
         store = open_store(self.data)
+        store = store if self.group is None else store.of_group(self.group)
         names = self.model or self._fitting(store)
         models = [
             load_dynamics(name, engine=self.engine, force=self.force) for name in names

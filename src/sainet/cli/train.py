@@ -37,6 +37,8 @@ class Train:
     a new one that adds to the assumed engine's motion, nothing at first. Other defaults
     hold then, for few recorded pushes: 'sainet train --start-from engine --help' shows
     them, and with the name of a network the others."""
+    group: str | None = None
+    """Group of pushes to train on (default: all groups)."""
     pushes: int | None = None
     """Pushes at the start of the dataset to train on; default: all."""
     config: FitConfig = field(default_factory=FitConfig)
@@ -52,6 +54,7 @@ class Train:
         from sainet.studies.curves import draw_history
 
         store = open_store(self.data)
+        store = store if self.group is None else store.of_group(self.group)
         store = store if self.pushes is None else store.first(self.pushes)
         done = 0
         title = f"Training {self.model.upper()}"

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Int, UInt64
 
+from sainet.datasets.pushes import hash_pushes, hashed_names
 from sainet.datasets.schema import FORMAT_VERSION, Kind, StoreInfo, sizes, variables
 from sainet.datasets.writer import ARRAYS, HASHES, chunk_files
 from sainet.runs.documents import content_hash, read_json, readable
@@ -109,6 +110,15 @@ class Store:
 
         whole = xarray.open_zarr(self.path / ARRAYS, consolidated=False, chunks=None)
         return whole if self.rows is None else whole.isel(push=list(self.rows))
+
+    def push_hashes(self) -> UInt64[np.ndarray, " push"]:
+        """Return the content hash of each push (see `datasets.pushes.hash_pushes`)."""
+        names = hashed_names(self.info)
+        parts = [
+            hash_pushes(self.read(self.info.chunk_slice(index), names), self.info)
+            for index in range(self.info.chunks)
+        ]
+        return np.concatenate(parts)
 
     @property
     def content(self) -> str:

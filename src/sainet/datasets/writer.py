@@ -1,13 +1,16 @@
 """Writing a store chunk by chunk; a list of hashes, written last, makes it whole."""
 
 import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from sainet.datasets.schema import FORMAT_VERSION, StoreInfo, sizes, variables
+from sainet.datasets.schema import FORMAT_VERSION, Arrays, StoreInfo, sizes, variables
 from sainet.runs.documents import content_hash, read_json, write_error, write_json
+from sainet.runs.folders import open_run
 
 ARRAYS = "pushes.zarr"
 HASHES = "hashes.json"
@@ -136,3 +139,30 @@ def write_store(folder: Path, info: StoreInfo, arrays: dict) -> None:
         part = {k: v[info.chunk_slice(index)] for k, v in arrays.items()}
         write_chunk(folder, info, index, part)
     finish(folder, info)
+
+
+def write_once(
+    out: Path,
+    settings: Mapping[str, Any],
+    info: StoreInfo,
+    make_chunk: Callable[[int], Arrays],
+) -> None:
+    """Write a store into a run folder; resume an interrupted one.
+
+    Args:
+        out: run folder.
+        settings: JSON values that determine the store.
+        info: of the store.
+        make_chunk: returns the arrays of one chunk.
+
+    Raises:
+        RunConflict: the folder holds something else, or another process works there.
+        BadInput: the disk is full.
+    """
+    if open_run(out, settings, finished_by=HASHES).is_finished:
+        clear_progress(out)
+        return
+    create_arrays(out, info)
+    for index in missing_chunks(out, info):
+        write_chunk(out, info, index, make_chunk(index))
+    finish(out, info)

@@ -1,69 +1,21 @@
-"""Cross-validation: folds that repeats never straddle, and their errors as one."""
+"""Errors of all folds of a cross-validation, joined."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Int
 
-from sainet.datasets.store import Store
+from sainet.datasets.splits import Fold
 from sainet.evaluation.evaluate import Evaluation
 from sainet.evaluation.metrics import PushErrors
 
-_STREAM = 0xF01D
-
-
-@dataclass(frozen=True)
-class Fold:
-    """Pushes that are tested on, and what may be trained on before."""
-
-    number: int
-    training: Store
-    tests: Store
-    rows: Int[np.ndarray, " test"]  # of the tests, in the whole store
-
-
-def make_folds(
-    store: Store,
-    count: int,
-    part: Int[np.ndarray, " some"] | None = None,
-) -> list[Fold]:
-    """Divide a store into folds of nearly one size; repeats stay together.
-
-    Args:
-        store: of all pushes.
-        count: of the folds.
-        part: the pushes to take alone, tested and trained on; they are in the same
-            fold whatever part is taken.
-    """
-    rows = np.arange(store.info.pushes) if part is None else part
-    owner = fold_of_push(store.repeats(), count)[rows]
-    return [
-        Fold(
-            number,
-            training=store.take(rows[owner != number]),
-            tests=store.take(rows[owner == number]),
-            rows=rows[owner == number],
-        )
-        for number in range(count)
-    ]
-
-
-def fold_of_push(
-    repeats: Int[np.ndarray, " push"], count: int, seed: int = 0
-) -> Int[np.ndarray, " push"]:
-    """Return the fold of each push, drawn at random: the same for repeats."""
-    kinds, kind = np.unique(repeats, return_inverse=True)
-    order = np.random.default_rng([_STREAM, seed]).permutation(len(kinds))
-    return order[kind] % count
-
 
 def join_folds(parts: Sequence[tuple[Fold, Evaluation]]) -> Evaluation:
-    """Return the evaluation of all pushes, each by what was not trained on it.
+    """Return the evaluation of all pushes, each by models not trained on it.
 
     Args:
         parts: of every fold, with the same models in each; together their tests are
-            all pushes that are looked at, each once.
+            all pushes of interest, each once.
     """
     order = np.argsort(np.concatenate([fold.rows for fold, _ in parts]))
     owner = np.concatenate([np.full(len(fold.rows), fold.number) for fold, _ in parts])

@@ -10,6 +10,7 @@ import numpy as np
 
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import simulated_name, variables
+from sainet.datasets.splits import split_rows
 from sainet.datasets.store import Store
 from sainet.engines.identified import IDENTIFIED
 from sainet.learning.assumed import AssumedEngine
@@ -17,7 +18,6 @@ from sainet.learning.config import FROM_ENGINE, FitConfig, ModelKind
 from sainet.learning.loss import LossWeights
 from sainet.learning.mirror import mirror_some
 from sainet.learning.single_steps import to_single_steps
-from sainet.learning.split import split
 from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import FitState, first_state
 from sainet.models.card import CARD, Card
@@ -107,7 +107,7 @@ class Task:
     @cached_property
     def _split(self) -> tuple[np.ndarray, np.ndarray]:
         config = self.config
-        return split(self.store.repeats(), config.validation_share, config.seed)
+        return split_rows(self.store.repeats(), config.validation_share, config.seed)
 
     def complete(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return stored arrays with the prediction that the network sees."""

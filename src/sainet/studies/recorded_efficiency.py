@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
-from sainet.evaluation.folds import Fold, fold_of_push, join_folds, make_folds
+from sainet.evaluation.folds import join_folds
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale

@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import Evaluation
-from sainet.evaluation.folds import Fold, fold_of_push, join_folds, make_folds
+from sainet.evaluation.folds import join_folds
 from sainet.evaluation.offsets import EndOffsets, end_offsets
 from sainet.evaluation.rows import comparison_rows
 from sainet.learning.config import Features, ModelKind

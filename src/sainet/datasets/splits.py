@@ -1,0 +1,193 @@
+"""Train and test parts of a dataset, and folds for cross-validation.
+
+Repeats stay together: a model trained on one repeat was, in effect, trained on all.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from sainet.datasets.store import Store, open_store
+from sainet.datasets.writer import write_once
+from sainet.runs.errors import BadInput, require
+from sainet.scenes.quantities import require_count
+
+_SPLIT_STREAM, _FOLD_STREAM = 0x5B117, 0xF01D
+_SAME_PLACE = 3e-4  # m
+_SAME_ANGLE = np.deg2rad(1.0)  # rad
+_BLOCK = 256  # pushes compared with all others at a time
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Test pushes, and the pushes that models of this fold may be trained on."""
+
+    number: int
+    training: Store
+    tests: Store
+    rows: Int[np.ndarray, " test"]  # of the tests, in the whole store
+
+
+def split(
+    store: Store, test: float = 0.2, seed: int = 0, *, chains: bool = False
+) -> tuple[Store, Store]:
+    """Return the training pushes and the test pushes, drawn at random.
+
+    Args:
+        store: at least two pushes that are not repeats of each other.
+        test: share of the test pushes, met as nearly as repeats allow.
+        seed: of the draw.
+        chains: keep recorded chains together as well (see `linked`).
+
+    Raises:
+        BadInput: all pushes belong together, so that one part would be empty.
+    """
+    kinds = linked(store) if chains else store.repeats()
+    trained, tested = split_rows(kinds, test, seed)
+    if not len(tested):
+        together = "repeats or one chain" if chains else "repeats"
+        raise BadInput(
+            f"{store.path}: all pushes are {together}, which stay together; "
+            "record other pushes."
+        )
+    return store.take(np.sort(trained)), store.take(np.sort(tested))
+
+
+def split_rows(
+    kinds: Int[np.ndarray, " push"], share: float, seed: int
+) -> tuple[Int[np.ndarray, " one"], Int[np.ndarray, " other"]]:
+    """Return the rows of the larger and of the smaller part, drawn at random.
+
+    At least one push is in either part, unless all are of one kind or share is zero.
+
+    Args:
+        kinds: equal numbers for pushes that stay together.
+        share: of the second part, met as nearly as the kinds allow.
+        seed: of the draw.
+    """
+    rng = np.random.default_rng([_SPLIT_STREAM, seed])
+    found, kind = np.unique(kinds, return_inverse=True)
+    order = np.argsort(rng.permutation(len(found))[kind], kind="stable")
+    between = 1 + np.flatnonzero(np.diff(kind[order]))
+    if not share or not len(between):
+        return np.arange(len(kinds)), order[:0]
+    kept = between[np.argmin(np.abs(between - share * len(kinds)))]
+    return order[kept:], order[:kept]
+
+
+def make_folds(
+    store: Store, count: int, part: Int[np.ndarray, " some"] | None = None
+) -> list[Fold]:
+    """Divide a store into folds of nearly equal size; repeats stay together.
+
+    Args:
+        store: of all pushes.
+        count: of the folds.
+        part: rows to use only, for tests and training; a push is in the same fold
+            whatever the part.
+    """
+    rows = np.arange(store.info.pushes) if part is None else part
+    owner = fold_of_push(store.repeats(), count)[rows]
+    return [
+        Fold(
+            number,
+            training=store.take(rows[owner != number]),
+            tests=store.take(rows[owner == number]),
+            rows=rows[owner == number],
+        )
+        for number in range(count)
+    ]
+
+
+def fold_of_push(
+    kinds: Int[np.ndarray, " push"], count: int, seed: int = 0
+) -> Int[np.ndarray, " push"]:
+    """Return the fold of each push, drawn at random: equal for pushes of one kind."""
+    found, kind = np.unique(kinds, return_inverse=True)
+    order = np.random.default_rng([_FOLD_STREAM, seed]).permutation(len(found))
+    return order[kind] % count
+
+
+def linked(store: Store) -> Int[np.ndarray, " push"]:
+    """Return a number for each push: repeats and pushes of one chain share it.
+
+    In a chain a push starts where another one ended: all disks within 0.3 mm and one
+    degree. A model of places may interpolate along chains.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    names = ("initial", "truth", "pose_observed")
+    arrays = store.read(slice(None), names)
+    before = arrays["initial"][..., :3]
+    after = _last_poses(arrays["truth"], arrays["pose_observed"] > 0)
+    count = store.info.pushes
+    _, first = np.unique(store.repeats(), return_inverse=True)
+    ones, others = [np.arange(count)], [count + first]  # a node for each set of repeats
+    for start in range(0, count, _BLOCK):
+        row, column = np.nonzero(_is_same(after[start : start + _BLOCK], before))
+        ones.append(start + row)
+        others.append(column)
+    edges = np.concatenate(ones), np.concatenate(others)
+    graph = coo_array((np.ones(len(edges[0])), edges), shape=(2 * count, 2 * count))
+    return connected_components(graph, directed=False)[1][:count]
+
+
+def _last_poses(
+    truth: Float[np.ndarray, "push time body 6"], known: Bool[np.ndarray, "push time"]
+) -> Float[np.ndarray, "push body 3"]:
+    """Return the last known poses; NaN, which equals nothing, where none is known."""
+    last = known.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
+    pose = truth[np.arange(len(truth)), last, :, :3].copy()
+    pose[~np.asarray(known.any(axis=1))] = np.nan
+    return pose
+
+
+def _is_same(
+    poses: Float[np.ndarray, "one body 3"], others: Float[np.ndarray, "other body 3"]
+) -> Bool[np.ndarray, "one other"]:
+    apart = poses[:, None] - others[None]
+    near = np.hypot(apart[..., 0], apart[..., 1]) <= _SAME_PLACE
+    turned = np.abs(np.mod(apart[..., 2] + np.pi, 2 * np.pi) - np.pi)
+    return (near & (turned <= _SAME_ANGLE)).all(axis=-1)
+
+
+def write_split(
+    store: Store,
+    out: Path,
+    *,
+    test: float = 0.2,
+    seed: int = 0,
+    chains: bool = False,
+) -> tuple[Store, Store]:
+    """Write the training and the test part as datasets, once.
+
+    Args:
+        store: to divide.
+        out: folder of the two run folders, `train` and `test`; interrupted ones resume.
+        test: share of the test pushes, above 0 and below 1.
+        seed: of the draw, 0 or more.
+        chains: keep recorded chains together as well (see `linked`).
+
+    Raises:
+        BadSetting: a setting is out of its range.
+        BadInput: one part would be empty, or the disk is full.
+        RunConflict: a folder holds something else.
+    """
+    require(0 < test < 1, "test", "above 0 and below 1", test)
+    require_count("seed", seed, low=0)
+    parts = split(store, test, seed, chains=chains)
+    settings = {"command": "split", "data": store.content, "test": float(test)}
+    settings |= {"seed": int(seed), "chains": chains}
+    written = []
+    for name, part in zip(("train", "test"), parts, strict=True):
+        write_once(
+            Path(out) / name,
+            settings | {"part": name},
+            part.info,
+            lambda index, part=part: part.read(part.info.chunk_slice(index)),
+        )
+        written.append(open_store(Path(out) / name))
+    return written[0], written[1]
