@@ -1,0 +1,166 @@
+"""Compare what two trees make: datasets, the JSON of commands, numbers on pages.
+
+    python tools/compare.py BASE [--tolerance 1e-6] [--recorded ENDPOINTS.csv]
+
+BASE is a checkout or a git revision; the other tree is this one. Both run here, with
+this Python and its packages. Prints one line for each comparison, with the first
+difference if there is one, and exits with 1 if anything differs.
+"""
+
+import argparse
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+# What BASE may still call models, engines and arrays, and what they are called now.
+RENAMED = {
+    f"{name}-calibrated": f"{name}-true"
+    for name in ("physics", "sain", "planar", "bullet")
+}
+# Sections of pages with another title now: {"results: old title": "results: new"}.
+TITLES: dict[str, str] = {}
+# Keys of JSON that hold times, or that BASE does not have.
+EXEMPT = {"median_decision_s"}
+_STORE = "--pushes 60 --chunk-size 30 --out"
+# Words of commands, which find here what those before them made.
+COMMANDS = (
+    f"generate robot --disks 1 {_STORE} robot-1",
+    "generate robot --engine bullet --assumed-engine planar bullet planar-calibrated "
+    f"{_STORE} robot-2",
+    f"generate robot --disks 5 --noise-level paper-like {_STORE} robot-5",
+    f"generate direct-force --noise-level none {_STORE} force-2",
+    f"generate direct-force --disks 3 --engine bullet {_STORE} force-3",
+    "import mitpush-endpoints RECORDED --out recorded",
+    "evaluate --model physics physics-calibrated in sain sain-bullet --data robot-2",
+    "evaluate --model physics in-stroke sain-stroke --data recorded",
+    "identify --data robot-1 --out identified",
+    "control --model sain --planner greedy --trials 2 --out greedy",
+    "control --model physics --planner tree --pushes 4 --trials 1 --out tree",
+)
+
+
+def main() -> int:
+    """Compare the trees; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("base", help="a checkout, or a git revision")
+    parser.add_argument("--tolerance", type=float, default=0.0, help="relative")
+    parser.add_argument("--recorded", type=Path, help="recorded pushes to import")
+    chosen = parser.parse_args()
+    differ = False
+    with tempfile.TemporaryDirectory() as work:
+        base = _tree(chosen.base, Path(work, "tree"))
+        places = (base, Path(work, "base")), (ROOT, Path(work, "new"))
+        for command in COMMANDS:
+            if chosen.recorded or "recorded" not in command:
+                words = command.replace("RECORDED", str(chosen.recorded)).split()
+                made = (_run(*place, words) for place in places)
+                differ |= _say(command, _first(*made, chosen.tolerance))
+    for title, difference in _pages(base):
+        differ |= _say(title, difference)
+    return int(differ)
+
+
+def _say(name: str, difference: str) -> bool:
+    print(f"{name}: {difference or 'equal'}", flush=True)
+    return bool(difference)
+
+
+def _tree(base: str, exported: Path) -> Path:
+    """Return the folder of a checkout, or of a revision that is exported for this."""
+    if Path(base).is_dir():
+        return Path(base).resolve()
+    exported.mkdir()
+    archive = ("git", "-C", ROOT, "archive", base)
+    packed = subprocess.run(archive, check=True, stdout=subprocess.PIPE).stdout
+    subprocess.run(("tar", "-x", "-C", exported), check=True, input=packed)
+    return exported
+
+
+def _run(tree: Path, place: Path, words: list[str]) -> dict[str, Any]:
+    """Return the values in a command's JSON and the hashes of the dataset it makes."""
+    place.mkdir(exist_ok=True)
+    environment = os.environ | {"PYTHONPATH": str(tree / "src")}
+    problem = ""
+    for said in (words, list(map(_renamed, words))):
+        line = (sys.executable, "-m", "sainet", *said, "--json", "--quiet")
+        done = subprocess.run(
+            line, check=False, cwd=place, env=environment, capture_output=True
+        )
+        if done.returncode == 0:
+            made = dict(_values(json.loads(done.stdout.splitlines()[-1])))
+            return made | _chunks(place / words[-1])
+        problem = problem or done.stderr.decode().strip()
+    return {str(tree): problem}
+
+
+def _chunks(folder: Path) -> dict[str, str]:
+    return {
+        _renamed(str(path.relative_to(folder))): sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.glob("*.zarr/*/c/**/*"))
+        if path.is_file()
+    }
+
+
+def _values(value: object, name: str = "") -> Iterator[tuple[str, object]]:
+    """Yield every plain value of JSON with its path, both with the names of now."""
+    if isinstance(value, dict | list):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        for key, each in items:
+            if key not in EXEMPT:
+                yield from _values(each, f"{name}.{_renamed(str(key))}")
+    else:
+        yield name, _renamed(value) if isinstance(value, str) else value
+
+
+def _renamed(text: str) -> str:
+    for old, new in RENAMED.items():
+        text = text.replace(old, new)
+    return text
+
+
+def _first(one: dict[str, Any], other: dict[str, Any], tolerance: float) -> str:
+    """Return the first difference in words; empty if there is none."""
+    for name in one | other:
+        was, now = (each.get(name, "missing") for each in (one, other))
+        near = isinstance(was, float) and isinstance(now, float)
+        if not (math.isclose(was, now, rel_tol=tolerance) if near else was == now):
+            return f"{name} was {was} and is {now}"
+    return ""
+
+
+def _pages(base: Path) -> Iterator[tuple[str, str]]:
+    """Yield each section of BASE's pages and how its numbers changed."""
+    old, new = _sections(base), _sections(ROOT)
+    for title, numbers in old.items():
+        found = new.get(TITLES.get(title, title), Counter())
+        lost, added = ([*(numbers - found)], [*(found - numbers)])
+        changed = f"gone {len(lost)} {lost[:5]}, new {len(added)} {added[:5]}"
+        yield title, changed if lost or added else ""
+
+
+def _sections(tree: Path) -> dict[str, Counter[str]]:
+    """Return how often each number stands in each section of the rendered pages."""
+    found: dict[str, Counter[str]] = {}
+    results = (page for page in tree.glob("docs/**/*.md") if "results" in str(page))
+    for page in (tree / "README.md", *sorted(results)):
+        text = _renamed(page.read_text("utf-8")).replace("−", "-").replace(",", "")
+        for part in re.split(r"^## ", text, flags=re.MULTILINE):
+            title, _, _ = part.partition("\n")
+            found[f"{page.stem}: {title}"] = Counter(
+                re.findall(r"-?\d+(?:\.\d+)?", part)
+            )
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main())
