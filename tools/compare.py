@@ -31,7 +31,7 @@ RENAMED = {
 TITLES: dict[str, str] = {}
 # Keys of JSON that hold times, or that BASE does not have.
 EXEMPT = {"median_decision_s"}
-_STORE = "--pushes 60 --chunk-size 30 --out"
+_STORE = "--pushes 60 --chunk-size 30 --seed 7 --out"
 # Words of commands, which find here what those before them made.
 COMMANDS = (
     f"generate robot --disks 1 {_STORE} robot-1",
