@@ -74,7 +74,9 @@ class Train:
                 start_from=self.start_from,
                 on_step=on_step,
             )
-        curve = draw_history(result, self.out / "learning-curve.svg")
+        curve = draw_history(
+            self.model, result.history, self.out / "learning-curve.svg"
+        )
         self.output.say(f"{self.model.upper()} is in {self.out}, its curve in {curve}")
         loss = result.history[-1]["loss"] if result.history else None
         return {"out": str(self.out), "model": self.model, "loss": loss}
