@@ -2,6 +2,8 @@
 
 import json
 import re
+import signal
+from contextlib import suppress
 from dataclasses import replace
 
 import equinox as eqx
@@ -31,6 +33,7 @@ from sainet.models.dynamics import SimulatorAugmented, predict
 from sainet.models.registry import load_dynamics
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, Diverged, RunConflict
+from sainet.runs.interrupts import remembered_interrupts
 from sainet.runs.manifest import MANIFEST
 from sainet.scenes.state import pack_motion
 
@@ -93,6 +96,20 @@ def test_a_finished_run_is_left_alone(trained, store):
     again = fit("sain", store, CONFIG, trained.folder, on_step=count)
     assert (steps, again.history) == ([], trained.history)
     assert contents(trained.folder) == before
+
+
+def test_a_swallowed_interrupt_ends_training_before_the_next_iteration(store, tmp_path):
+    seen = []
+
+    def on_step(iteration, loss):
+        seen.append(iteration)
+        if iteration == 2:
+            with suppress(KeyboardInterrupt):  # as Python does in a finaliser
+                signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt), remembered_interrupts():
+        fit("sain", store, CONFIG, tmp_path / "out", on_step=on_step)
+    assert seen == [1, 2]
 
 
 def test_other_settings_touch_nothing(trained, store):

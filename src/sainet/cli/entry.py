@@ -27,6 +27,7 @@ from sainet.cli.reproduce import Reproduce
 from sainet.cli.split import Split
 from sainet.cli.train import Train, going_on
 from sainet.runs.errors import BadInput, SainetError
+from sainet.runs.interrupts import remembered_interrupts
 
 _COMMANDS = {
     "demo": Demo,
@@ -100,7 +101,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     command = None
     try:
         command = parse(words)
-        finish(command.run(), command.output)
+        with remembered_interrupts():
+            finish(command.run(), command.output)
     except SainetError as error:
         command_type = _COMMANDS.get(words[0] if words else "")
         print(f"sainet: {message(error, command_type)}", file=sys.stderr)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from sainet.cli.output import Output
+from sainet.runs.interrupts import raise_if_interrupted
 
 Advance = Callable[[int, str], None]  # by how much, and a note
 
@@ -49,6 +50,7 @@ def progress_bar(title: str, total: int | None, output: Output) -> Iterator[Adva
         task = bar.add_task(title, total=total, note="")
 
         def advance(amount: int, note: str = "") -> None:
+            raise_if_interrupted()
             bar.update(task, advance=amount, note=note)
 
         yield advance

@@ -36,6 +36,7 @@ from sainet.models.registry import SHIPPED, network_folder
 from sainet.runs.documents import content_hash, read_json, write_json
 from sainet.runs.errors import Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
+from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, manifest
 
 STATE = "state.safetensors"
@@ -168,6 +169,7 @@ def _iterate(
         for iteration in range(
             int(progress.state.iteration) + 1, config.iterations + 1
         ):
+            raise_if_interrupted()
             arrays = reader.batch(iteration - 1)
             batch = even_batch(task.to_training_batch(*arrays, iteration))
             progress.state, loss = step(progress.state, batch)

@@ -14,6 +14,7 @@ from multiprocessing.queues import SimpleQueue
 from typing import Any, final
 
 from sainet.runs.errors import BadSetting, SainetError
+from sainet.runs.interrupts import remember_interrupt
 
 # What a failure sends to the workers of its own pool. Those of a background job ignore
 # SIGINT, which a shell means for what stands in the foreground.
@@ -150,6 +151,7 @@ def _interrupt(number: int, frame: object) -> None:
     is_first = not _worker.is_interrupted
     _worker.is_interrupted = True
     if is_first and _worker.is_busy:
+        remember_interrupt()
         raise KeyboardInterrupt
 
 

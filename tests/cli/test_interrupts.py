@@ -1,0 +1,80 @@
+"""Ctrl-C ends a command even where Python or a library swallows the exception."""
+
+import os
+import signal
+
+import pytest
+
+from sainet import cli
+from sainet.cli import entry
+from sainet.cli.generate import Generate
+from sainet.cli.output import Output
+from sainet.cli.progress import progress_bar
+from sainet.runs.interrupts import raise_if_interrupted, remembered_interrupts
+
+pytestmark = pytest.mark.filterwarnings(
+    "ignore::pytest.PytestUnraisableExceptionWarning"
+)
+
+
+class Swallower:
+    """Raises in its finaliser, where Python prints an exception and forgets it."""
+
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def swallow():
+    Swallower()
+
+
+@pytest.fixture(autouse=True)
+def _foreground():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize(("swallowed_at", "steps"), [(3, 3), (10, 10)])
+def test_a_swallowed_interrupt_ends_the_command(
+    swallowed_at, steps, monkeypatch, capsys, tmp_path
+):
+    command = Generate(out=tmp_path, output=Output(quiet=True))
+    done = []
+
+    def run(self):
+        with progress_bar("Simulating", 10, self.output) as advance:
+            for step in range(1, 11):
+                advance(1)
+                done.append(step)
+                if step == swallowed_at:
+                    swallow()
+        return {}
+
+    monkeypatch.setattr(Generate, "run", run)
+    monkeypatch.setattr(entry, "parse", lambda words: command)
+    assert entry.run(["anything"]) == entry.INTERRUPTED
+    assert len(done) == steps
+    told = "sainet: interrupted; the same command goes on from here.\n"
+    assert capsys.readouterr().err.endswith(told)
+
+
+def test_the_next_command_in_this_process_is_not_interrupted():
+    with pytest.raises(KeyboardInterrupt), remembered_interrupts():
+        swallow()
+    raise_if_interrupted()
+
+
+def test_a_command_that_has_ended_cannot_be_interrupted(monkeypatch):
+    monkeypatch.setattr(entry, "run", lambda: 0)
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    os.kill(os.getpid(), signal.SIGINT)
+    assert ended.value.code == 0
+
+
+def test_a_background_job_still_ignores_what_its_shell_has_it_ignore():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with remembered_interrupts():
+        os.kill(os.getpid(), signal.SIGINT)
+        raise_if_interrupted()
