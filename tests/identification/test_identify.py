@@ -16,7 +16,9 @@ from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.identified import FILE, beliefs_of, engine_of_beliefs, read_values
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.identification import intervals as intervals_module
 from sainet.identification.identify import identify, identify_into
+from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     doubt,
     from_coordinate,
@@ -94,6 +96,24 @@ def test_the_values_of_the_world_are_found_within_their_intervals(found):
     assert found.pushes == 24
     assert found.after_mm < 0.5 * found.before_mm
     assert found.after_deg < 0.7 * found.before_deg
+
+
+def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(store, monkeypatch):
+    """Each end leaves out 2.5 percent: 1.96 standard errors from the estimate."""
+    wrong_by = 0.01 * np.random.default_rng(0).normal(size=(400, 1))  # mm
+
+    def residuals(at, scale, part):
+        return at["camera_x_mm"] - wrong_by
+
+    monkeypatch.setattr(intervals_module, "residuals", residuals)
+    monkeypatch.setattr(
+        intervals_module, "slopes", lambda *problem: np.ones((400, 1, 1))
+    )
+    value, error = wrong_by.mean(), wrong_by.std() / np.sqrt(400)
+    problem = ["camera_x_mm"], Scale(1, 1), samples(store)[:1]
+    found = intervals({"camera_x_mm": value}, *problem)
+    ends = (np.array(found["camera_x_mm"]) - value) / error
+    np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.12)
 
 
 def test_what_the_data_cannot_tell_is_said_and_stays(found):

@@ -15,8 +15,9 @@ from planning.scenes import FEW, RADIUS, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning import PLANNERS, make_planner
+from sainet.planning import tree as tree_module
 from sainet.planning.greedy import GreedyPlanner
-from sainet.planning.levels import flatten
+from sainet.planning.levels import Level, flatten
 from sainet.planning.outcomes import every_push, roll_pushes
 from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
@@ -168,6 +169,26 @@ def test_a_deadline_ends_with_the_best_so_far():
     plan = patient.plan(PHYSICS, FAR, SCENE, STATE)
     assert indices(plan) == best_of(FAR, 2)
     assert plan.is_complete
+
+
+def test_what_a_deadline_leaves_time_for_is_what_follows_the_best_first_pushes(
+    monkeypatch,
+):
+    task = goal_ahead(0.17, -0.9)  # the best pushes stand last in the grid
+    times = iter([0.0, 1.0, 2.0, 9.0])  # two blocks, then it is too late
+    monkeypatch.setattr(tree_module.time, "perf_counter", lambda: next(times))
+    grown, grow = [], Level.grow
+
+    def spied(level, rows, expand):
+        grown.extend(rows)
+        return grow(level, rows, expand)
+
+    monkeypatch.setattr(Level, "grow", spied)
+    planner = TreePlanner(actions=FEW, deadline=5.0, block=2)
+    found = planner.search(PHYSICS, task, SCENE, STATE)
+    assert (found.looked_at, found.is_complete) == (6 + 4 * 6, False)
+    costs = {s[0]: float(task.cost(end)) for s, end in naive_ends(1).items() if s}
+    assert grown == sorted(costs, key=costs.__getitem__)[:4]
 
 
 def test_outcomes_are_those_of_single_predictions():
