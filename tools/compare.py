@@ -64,7 +64,7 @@ def main() -> int:
             if chosen.recorded or "recorded" not in command:
                 words = command.replace("RECORDED", str(chosen.recorded)).split()
                 made = (_run(*place, words) for place in places)
-                differ |= _say(command, _first(*made, chosen.tolerance))
+                differ |= _say(command, _first(*made, tolerance=chosen.tolerance))
     for title, difference in _pages(base):
         differ |= _say(title, difference)
     return int(differ)
@@ -128,7 +128,7 @@ def _renamed(text: str) -> str:
     return text
 
 
-def _first(one: dict[str, Any], other: dict[str, Any], tolerance: float) -> str:
+def _first(one: dict[str, Any], other: dict[str, Any], *, tolerance: float) -> str:
     """Return the first difference in words; empty if there is none."""
     for name in one | other:
         was, now = (each.get(name, "missing") for each in (one, other))
