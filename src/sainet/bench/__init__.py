@@ -1,7 +1,7 @@
-"""Benchmarks of what has to be fast: each case returns its figures in one dict.
+"""Benchmarks of the time-critical parts: each case returns its figures in one dict.
 
-Figures compare what was measured side by side, for machines are shared and their
-speed drifts; `docs/benchmarks.md` says what each of them means.
+Figures compare measurements of the same run, because the speed of shared machines
+drifts; `docs/benchmarks.md` defines each figure.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ CASES = {
 
 
 def load_case(name: str) -> Callable[..., dict[str, Any]]:
-    """Return the function of a case; its argument `runs` is the measurements to take.
+    """Return the function of a case; its argument `runs` is the number of measurements.
 
     Raises:
         UnknownName: no case has this name.

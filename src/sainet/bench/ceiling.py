@@ -1,4 +1,4 @@
-"""What the machine can do at most, measured in the same run as what is judged by it."""
+"""The matrix-product ceiling of the machine, measured in the run that uses it."""
 
 import numpy as np
 
@@ -10,11 +10,11 @@ SIZE = 1024
 def ceiling_gflops(products: int = 5) -> float:
     """Return the rate of NumPy's float32 1024 x 1024 product on all cores (GFLOP/s).
 
-    A product of n x n matrices counts ``2 n^3`` operations. The result has its place
-    in memory beforehand: making room for it is none of the product's work.
+    A product of n x n matrices counts as ``2 n^3`` operations. The memory of the result
+    is allocated in advance, because allocation is not part of the product.
 
     Args:
-        products: how many are timed, for the median; one more warms up.
+        products: number of timed products, for the median; one more is the warm-up.
     """
     left, right = np.random.default_rng(0).random((2, SIZE, SIZE), dtype=np.float32)
     result = np.empty_like(left)

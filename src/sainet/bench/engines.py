@@ -1,6 +1,6 @@
-"""How many scenes the planar engine moves by one step in a second, and how many Bullet.
+"""Scene steps per second of the planar engine and of Bullet.
 
-Both on the same pushes, in the same run, on all cores.
+Both simulate the same pushes, in the same run, on all cores.
 """
 
 from importlib.util import find_spec
@@ -21,9 +21,9 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 
-BULLET_BATCH = 400  # scenes, the first of the batch: enough for every process
-BATCH = 72 * 72  # scenes: every sequence of two pushes of the grid
-STEPS = 80  # 48 that move the pusher, 32 that settle: one planned push
+BULLET_BATCH = 400  # scenes at the start of the batch: enough for every process
+BATCH = 72 * 72  # scenes: every sequence of two candidate pushes
+STEPS = 80  # of a planned push: 48 of motion and 32 to settle
 _HOLD_STEPS = 32
 
 Pushes = tuple[Scene, State, Controls]
@@ -32,16 +32,16 @@ Pushes = tuple[Scene, State, Controls]
 def bench_engines(
     runs: int = 5, *, batch: int = BATCH, steps: int = STEPS
 ) -> dict[str, Any]:
-    """Measure the planar engine on the planner's load, compilation excluded.
+    """Return the speed of both engines under the planner's load, without compilation.
 
     Args:
-        runs: measurements to take the median of.
-        batch: scenes of two disks, with the distributions of the paper.
-        steps: of 1/240 s, at most 80; the pusher moves in the first 48.
+        runs: number of measurements, for the median.
+        batch: number of scenes with two disks, from the paper's distributions.
+        steps: steps of 1/240 s, at most 80; the pusher moves in the first 48.
 
     Returns:
-        `planar_scene_steps_per_s`, `bullet_scene_steps_per_s` and the ratio of both,
-        `bullet_ratio` (None without PyBullet), and the sizes they were measured with.
+        `planar_scene_steps_per_s`, `bullet_scene_steps_per_s` and their ratio
+        `bullet_ratio` (None without PyBullet), and the sizes of the measurement.
     """
     check_runs(runs)
     pushes = _pushes(batch, steps)
@@ -56,7 +56,7 @@ def bench_engines(
 
 
 def _measure(pushes: Pushes) -> tuple[float, float | None]:
-    """Return how many scenes each engine rolls out in a second, one after the other."""
+    """Return the scenes per second of each engine, measured one after the other."""
     engine = PlanarEngine()
     time = median_seconds(lambda: over_devices(_rollout, engine, *pushes), 1)
     return _count(pushes) / time, _bullet_rate(pushes)
@@ -66,7 +66,7 @@ def _bullet_rate(pushes: Pushes) -> float | None:
     if not find_spec("pybullet"):
         return None
     few, engine = jax.tree.map(lambda x: x[:BULLET_BATCH], pushes), BulletEngine()
-    # The call that warms up starts the processes.
+    # The warm-up call starts the processes.
     return _count(few) / median_seconds(lambda: engine.rollout(*few), 1)
 
 
@@ -77,7 +77,7 @@ def _count(pushes: Pushes) -> int:
 def _figures(
     measured: list[tuple[float, float | None]], steps: int
 ) -> dict[str, float | None]:
-    """Return the medians; of the ratio, over what was measured side by side."""
+    """Return the medians; the ratio is the median of the ratios of each measurement."""
     ratios = [planar / bullet for planar, bullet in measured if bullet]
     rates = [bullet for _, bullet in measured if bullet]
     return {

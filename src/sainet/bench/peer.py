@@ -1,7 +1,7 @@
-"""The same training iteration in PyTorch, in an environment and a process of its own.
+"""The same training iteration in PyTorch, in a separate environment and process.
 
-PyTorch is no dependency of the package: the comparison lives in `benchmarks/`, beside
-the sources, and `make torch-env` makes its environment.
+PyTorch is not a dependency of the package: the comparison is in `benchmarks/`, next to
+the sources, and `make torch-env` creates its environment.
 """
 
 import json
@@ -27,43 +27,43 @@ _TOLERANCE = 1e-3  # of the first loss, relative: single precision over 200 step
 
 
 def missing_torch() -> str | None:
-    """Return why there is nothing to compare with, None if there is."""
+    """Return why no comparison with PyTorch is possible, or None if it is."""
     if not _SCRIPT.is_file():
-        return "benchmarks/ is not in the installed package; run from a checkout"
+        return "the installed package has no benchmarks/; run from a checkout"
     if not any(FOLDER.glob(".venv/lib/python*/site-packages/torch/__init__.py")):
         return "no PyTorch in benchmarks/.venv; run `make torch-env`"
     return None
 
 
 class TorchPeer:
-    """Trains on a saved problem with PyTorch, as long as it does the same work."""
+    """Training on a saved problem with PyTorch, checked to do the same work."""
 
     def __init__(self, problem: Path, loss: float) -> None:
-        """Remember the file of `save_problem` and the loss before the first step."""
+        """Store the file of `save_problem` and our loss before the first step."""
         self._problem = problem
         self._loss = loss
 
     def iteration_ms(self, iterations: int = 5) -> float:
-        """Return the median time of some iterations, after one that warms up (ms).
+        """Return the median time of some iterations (ms), after a warm-up iteration.
 
         Raises:
-            SainetError: its first loss is not ours.
+            SainetError: the first loss of PyTorch differs from ours.
         """
         result = run_torch(self._problem, iterations)
         difference = abs(result["loss"] - self._loss)
         if not difference <= _TOLERANCE * abs(self._loss):
             raise SainetError(
-                f"{_SCRIPT.name}: the first loss is {result['loss']:.6g} and ours "
-                f"{self._loss:.6g}; the comparison must do the same work, mend it."
+                f"{_SCRIPT.name}: the first loss is {result['loss']:.6g}, ours is "
+                f"{self._loss:.6g}; change the script so that both do the same work."
             )
         return result["iteration_ms"]
 
 
 def run_torch(problem: Path, iterations: int = 5) -> dict[str, Any]:
-    """Return what `benchmarks/torch_training.py` prints about a saved problem.
+    """Return the results of `benchmarks/torch_training.py` on a saved problem.
 
     Raises:
-        SainetError: it failed.
+        SainetError: the script failed.
     """
     command = [str(_PYTHON), str(_SCRIPT), str(problem), str(iterations)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -74,9 +74,9 @@ def run_torch(problem: Path, iterations: int = 5) -> dict[str, Any]:
 
 
 def save_problem(path: Path, problem: Problem) -> Path:
-    """Write a problem as plain arrays, everything in the push frame; return the path.
+    """Write a problem as arrays in the push frame and return the path.
 
-    Weights are saved as they are, with axes ``[input, output]``.
+    Weights have axes ``[input, output]``.
     """
     network, weights = problem.state.network, problem.weights
     arrays = _batch_arrays(problem)
@@ -117,5 +117,5 @@ def _batch_arrays(problem: Problem) -> dict[str, Any]:
         "pose": target.pose.swapaxes(0, 1),
         "rate": target.rate.swapaxes(0, 1),
     }
-    # Not the pushes that were repeated to make the batch even.
+    # Leave out the pushes that were repeated to make the batch even.
     return {name: value[:size] for name, value in arrays.items()}

@@ -1,4 +1,4 @@
-"""How long a decision takes, and what the same look ahead would cost in Bullet."""
+"""Time of a decision, and time of the same predictions in Bullet."""
 
 import os
 import subprocess
@@ -24,8 +24,8 @@ from sainet.planning.outcomes import batch_of, roll_pushes
 from sainet.scenes.pushes import PushGrid
 
 DECISIONS = 50
-_ROUNDS = 5  # in each of which decisions and pushes in Bullet take turns
-_PUSHES = 20  # in Bullet, in a round
+_ROUNDS = 5  # in each, decisions alternate with pushes in Bullet
+_PUSHES = 20  # Bullet pushes per round
 _FIRST_DECISION = """
 import jax
 jax.config.update("jax_num_cpu_devices", {devices})
@@ -37,16 +37,16 @@ decide({model!r})
 def bench_planning(
     runs: int = DECISIONS, *, model: str = "sain", starts: bool = True
 ) -> dict[str, Any]:
-    """Measure decisions of both planners, Bullet beside them, and the first one.
+    """Return decision times of both planners, of Bullet, and of new processes.
 
     Args:
-        runs: decisions of each planner to take the median of.
-        model: what they predict with.
-        starts: whether new processes are started to time their first decision.
+        runs: decisions per planner, for the median.
+        model: name of the model that predicts.
+        starts: whether to start new processes and time their first decision.
 
     Returns:
         `full_tree_s`, `greedy_s`, `bullet_ratio`, `cold_start_s`, `warm_start_s`, and
-        what they rest on.
+        the sizes of the measurement.
     """
     check_runs(runs)
     # The first decision compiles.
@@ -73,7 +73,7 @@ def bench_planning(
 
 
 def decide(model: str, planner: str = "tree") -> Plan:
-    """Make one decision at the start of a hard trial."""
+    """Return the plan of one decision at the start of a hard trial."""
     trial = _trial()
     dynamics = load_dynamics(model).dynamics
     state = trial.robot.observe()
@@ -93,7 +93,7 @@ def _timed(model: str, planner: str) -> float:
 
 
 def _bullet_pushes() -> list[float]:
-    """Return how long pushes take in one Bullet world (s); none without PyBullet."""
+    """Return the times of pushes in one Bullet world (s); empty without PyBullet."""
     if not find_spec("pybullet"):
         return []
     trial, physics = _trial(), PhysicsDynamics(make_engine("bullet"))
@@ -111,7 +111,7 @@ def _bullet_pushes() -> list[float]:
 
 
 def _starts(model: str) -> tuple[float, float]:
-    """Return how long a process takes to decide, without compiled code and with it."""
+    """Return the times to the first decision (s), without and with compiled code."""
     code = _FIRST_DECISION.format(model=model, devices=jax.device_count())
     with TemporaryDirectory(prefix="sainet-bench-") as folder:
         settings = {

@@ -1,4 +1,4 @@
-"""The training problem that is timed: SAIN on simulated pushes, as `fit` trains it."""
+"""The training problem of the benchmark: SAIN on simulated pushes, as in `fit`."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from sainet.models.features import feature_set
 
 
 class Problem(NamedTuple):
-    """All that a gradient step needs."""
+    """Inputs of a gradient step."""
 
     config: FitConfig
     state: FitState
@@ -25,11 +25,11 @@ class Problem(NamedTuple):
 
 
 def make_problem(pushes: int = 100, steps: int = 200) -> Problem:
-    """Simulate a batch and make an untrained SAIN for it.
+    """Return a simulated batch with an untrained SAIN.
 
     Args:
-        pushes: in the batch: robot setup, two disks, distributions of the paper.
-        steps: to keep of each push, at most 200.
+        pushes: pushes in the batch: robot setup, two disks, the paper's distributions.
+        steps: steps of each push, at most 200.
     """
     data = GenerateConfig(pushes=pushes, chunk_size=pushes)
     info = store_info(data)

@@ -1,4 +1,4 @@
-"""How long a call takes, its arrays included."""
+"""Time of a call, including the computation of its arrays."""
 
 from collections.abc import Callable
 from statistics import median
@@ -11,7 +11,7 @@ from sainet.runs.errors import BadSetting
 
 
 def seconds(call: Callable[[], Any]) -> float:
-    """Return how long one call takes until all arrays that it returns are there (s)."""
+    """Return the time of one call until all arrays that it returns are computed (s)."""
     start = perf_counter()
     jax.block_until_ready(call())
     return perf_counter() - start
@@ -20,12 +20,12 @@ def seconds(call: Callable[[], Any]) -> float:
 def median_seconds(
     call: Callable[[], Any], runs: int = 5, *, warm_up: int = 1
 ) -> float:
-    """Return the median of several calls (s).
+    """Return the median time of several calls (s).
 
     Args:
-        call: what is timed; the arrays that it returns are waited for.
-        runs: how many calls are timed.
-        warm_up: calls before those, which compile and wake threads; not timed.
+        call: function to time, including the computation of the arrays it returns.
+        runs: number of timed calls.
+        warm_up: earlier calls that are not timed, for compilation and thread start.
     """
     check_runs(runs)
     for _ in range(warm_up):
@@ -34,6 +34,6 @@ def median_seconds(
 
 
 def check_runs(runs: int) -> None:
-    """Raise `BadSetting` unless there is something to take the median of."""
+    """Raise `BadSetting` if there are no measurements to take the median of."""
     if runs < 1:
         raise BadSetting("runs", runs, "at least 1")

@@ -1,7 +1,7 @@
-"""How close one training iteration of the paper's batch comes to the machine's ceiling.
+"""One training iteration on the paper's batch, relative to the machine's ceiling.
 
-The ceiling, our iteration and PyTorch's are measured side by side, several times over;
-every figure is the median of those measurements.
+The ceiling, our iteration and the PyTorch iteration are measured in turn, several
+times; every figure is the median of these measurements.
 """
 
 import logging
@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 class Measurement(NamedTuple):
-    """What was measured side by side."""
+    """Times of one round of measurements."""
 
     ceiling_gflops: float
     iteration_ms: float
@@ -32,19 +32,19 @@ class Measurement(NamedTuple):
 
 
 class TrainingLoop:
-    """Iterates on one batch, each time from where the last iteration ended."""
+    """Training iterations on one batch, each from the state of the previous one."""
 
     def __init__(self, problem: Problem) -> None:
-        """Compile and make the first iteration; `first_loss` is before it."""
+        """Compile and run the first iteration; `first_loss` is the loss before it."""
         self._step = make_step(problem.config, problem.weights)
         self._batch = problem.batch
-        # Where the step leaves its result; elsewhere, the second call compiles anew.
+        # Match the step's output device; otherwise the second call compiles again.
         state = jax.device_put(problem.state, jax.devices()[0])
         self._state, loss = self._step(state, problem.batch)
         self.first_loss = float(loss)
 
     def advance(self) -> Any:  # noqa: ANN401
-        """Make one iteration and return its arrays."""
+        """Run one iteration and return its arrays."""
         self._state, loss = self._step(self._state, self._batch)
         return self._state, loss
 
@@ -52,19 +52,20 @@ class TrainingLoop:
 def bench_training(
     runs: int = 5, *, pushes: int = 100, steps: int = 200, repeats: int = 5
 ) -> dict[str, Any]:
-    """Measure a training iteration of SAIN: gradient and Adam's update.
+    """Return the time of a training iteration of SAIN: gradient and Adam update.
 
     Args:
-        runs: measurements to take the median of.
-        pushes: in the batch, two disks each, robot setup.
-        steps: of each push, at most 200.
-        repeats: iterations in a measurement, of which it is the median.
+        runs: number of measurements, for the median.
+        pushes: pushes in the batch, with two disks each, robot setup.
+        steps: steps of each push, at most 200.
+        repeats: iterations per measurement, for its median.
 
     Returns:
-        `iteration_ms`, `ceiling_fraction`, `eager_torch_ratio` and what they rest on.
+        `iteration_ms`, `ceiling_fraction`, `eager_torch_ratio` and the sizes of the
+        measurement.
 
     Raises:
-        SainetError: PyTorch's first loss is not ours: it did other work.
+        SainetError: the first loss of PyTorch differs from ours.
     """
     check_runs(runs)
     problem = make_problem(pushes, steps)
@@ -90,11 +91,11 @@ def bench_training(
 def counted_gflop(
     network: InteractionNetwork, pushes: int, steps: int, bodies: int
 ) -> float:
-    """Return the work of an iteration's matrix products (1e9 operations).
+    """Return the operations in the matrix products of an iteration (1e9).
 
-    A linear layer of K inputs and N outputs costs ``2 K N`` for each row and twice as
-    much on the way back; what is recomputed there is not counted. f_rel has a row for
-    each ordered pair of bodies, f_dyn one for each body.
+    A linear layer with K inputs and N outputs costs ``2 K N`` per row, and twice as
+    much in the backward pass, without recomputed products. f_rel has one row for each
+    ordered pair of bodies, f_dyn one for each body.
     """
     pairs = bodies * (bodies - 1)
     row = 2 * (pairs * _weights(network.rel) + bodies * _weights(network.dyn))
@@ -106,8 +107,8 @@ def _weights(layers: Any) -> int:  # noqa: ANN401
 
 
 def _measure(loop: TrainingLoop, peer: TorchPeer | None, repeats: int) -> Measurement:
-    # In blocks, each with a warm-up of its own: NumPy's threads go on spinning for some
-    # milliseconds after a product and would slow an iteration right behind it.
+    # In blocks with a warm-up each: NumPy's threads keep spinning for some milliseconds
+    # after a product and would slow down an iteration that follows immediately.
     ceiling = ceiling_gflops()
     ours = 1000 * median_seconds(loop.advance, repeats)
     theirs = None if peer is None else peer.iteration_ms(repeats)

@@ -1,4 +1,4 @@
-"""Work on a batch, spread over all of JAX's devices."""
+"""Computation on batches, split over all JAX devices."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -9,12 +9,12 @@ import jax
 import jax.numpy as jnp
 from jax.sharding import AxisType, Mesh, PartitionSpec
 
-BATCH = "batch"  # the name of the mesh axis that batches are sharded over
+BATCH = "batch"  # name of the mesh axis over which batches are sharded
 
 
 @lru_cache
 def batch_mesh() -> Mesh:
-    """Return the mesh of all devices along one axis, `BATCH`."""
+    """Return a mesh of all devices along one axis, `BATCH`."""
     return jax.make_mesh((jax.device_count(),), (BATCH,), axis_types=(AxisType.Auto,))
 
 
@@ -25,17 +25,17 @@ def over_devices(
     *batched: Any,  # noqa: ANN401
     most: int | None = None,
 ) -> Any:  # noqa: ANN401
-    """Compute ``function(shared, *batched)`` with the batch split over the devices.
+    """Return ``function(shared, *batched)``, with the batch split over all devices.
 
     Args:
-        function: works on any batch size; compiled once for each set of shapes.
-        shared: a tree that every device sees whole.
-        batched: trees whose arrays have the batch as their first axis.
-        most: rows that a device works on at a time, for what it works on to stay in
-            its cache; None is all of them.
+        function: accepts any batch size; compiled once per set of shapes.
+        shared: tree that is copied to every device.
+        batched: trees of arrays whose first axis is the batch.
+        most: rows per device at a time, so that intermediate arrays stay in its cache;
+            None for all rows.
 
     Returns:
-        What the function returned, its arrays' first axis being the batch.
+        The result of the function; the first axis of its arrays is the batch.
     """
     arrays, static = eqx.partition((shared, batched), eqx.is_array)
     size = jax.tree.leaves(arrays[1])[0].shape[0]
@@ -66,7 +66,7 @@ def over_devices(
 
 
 def _pad(array: jax.Array, padding: int) -> jax.Array:
-    # Repeat the last row: zeros would be scenes that cannot exist.
+    # Repeat the last row: zeros would be impossible scenes.
     if not padding:
         return array
     tail = jnp.repeat(array[-1:], padding, axis=0)

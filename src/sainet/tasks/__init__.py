@@ -1,1 +1,1 @@
-"""What a robot is asked for: tasks, their costs, and goals drawn as in the paper."""
+"""Tasks of the robot: goals drawn as in the paper, and costs for the planners."""

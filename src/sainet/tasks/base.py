@@ -1,4 +1,4 @@
-"""What every task can say of a state."""
+"""The interface of tasks."""
 
 from abc import abstractmethod
 
@@ -10,16 +10,16 @@ from sainet.scenes.state import State
 
 
 class AbstractTask(eqx.Module):
-    """Judges states; all arguments share their leading batch axes."""
+    """A task that the robot has to solve; arguments share their leading batch axes."""
 
     @abstractmethod
     def distance(self, state: State) -> Float[Array, "*batch"]:
-        """Return how far the task is from being solved (m)."""
+        """Return the remaining distance (m)."""
 
     @abstractmethod
     def cost(self, state: State) -> Float[Array, "*batch"]:
-        """Return what a planner should make small: the distance, and more."""
+        """Return the cost that planners minimise (m)."""
 
     @abstractmethod
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
-        """Return whether nothing is left to do."""
+        """Return whether the task is solved."""

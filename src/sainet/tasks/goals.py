@@ -1,11 +1,11 @@
-"""Goals drawn as in the paper (section IV-A): easy ones ahead, hard ones aside."""
+"""Random goals as in the paper (section IV-A): easy goals ahead, hard goals aside."""
 
 from typing import Literal
 
 import numpy as np
 
 GoalKind = Literal["easy", "hard"]
-# Angles from the axis of the disks, to either side (degrees).
+# Angles from the axis through the disks, to either side (degrees).
 ANGLES: dict[GoalKind, tuple[float, float]] = {
     "easy": (0.0, 30.0),
     "hard": (30.0, 60.0),
@@ -23,15 +23,15 @@ def draw_goal(
     axis: float,
     radius: float,
 ) -> np.ndarray:
-    """Draw the place of a goal (m); the same seed and trial give the same goal.
+    """Return the position of a goal (m); equal seeds and trials have equal goals.
 
     Args:
         kind: easy or hard.
-        seed: of all trials.
-        trial: which one.
-        disk: centre of the disk that is to be moved, m.
-        axis: angle that the goal's angle is measured from, rad.
-        radius: of that disk, m.
+        seed: common to all trials.
+        trial: index of the trial.
+        disk: centre of the target disk, m.
+        axis: angle of the axis through the disks, rad.
+        radius: radius of the target disk, m.
     """
     rng = np.random.default_rng([_STREAM, seed, trial, list(ANGLES).index(kind)])
     low, high = np.deg2rad(ANGLES[kind])

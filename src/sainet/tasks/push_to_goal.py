@@ -1,4 +1,4 @@
-"""The paper's task (section IV-A): push disk 1 until another disk is at its goal."""
+"""The paper's task (section IV-A): push disk 1 until the target disk is at its goal."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,23 +15,24 @@ ALIGNMENT = 3.0
 
 
 class PushToGoal(AbstractTask):
-    """One disk must come to a place; only disk 1 is pushed.
+    """Move the target disk to a goal by pushing disk 1.
 
-    The cost is the paper's heuristic, ``|p_m - g| + w (1 - cos)`` with the cosine of
-    the angle between goal and moved disk as disk 1 sees them: it keeps both disks and
-    the goal on one line. (The paper adds a length and a number, w = 1.)
+    The cost is the paper's heuristic, ``|p_m - g| + w (1 - cos)``, with the cosine of
+    the angle at disk 1 between the goal and the target disk: this term keeps both disks
+    and the goal on one line. (The paper adds a length and a number, w = 1.)
     """
 
     goal: Float[Array, " 2"]  # m
-    moved: int = eqx.field(static=True, default=1)  # index of the disk
-    tolerance: float = eqx.field(static=True, default=TOLERANCE_RADII)  # of its radius
+    moved: int = eqx.field(static=True, default=1)  # index of the target disk
+    # Fraction of the radius of the target disk.
+    tolerance: float = eqx.field(static=True, default=TOLERANCE_RADII)
     alignment: float = eqx.field(static=True, default=ALIGNMENT)  # w, m
 
     def distance(self, state: State) -> Float[Array, "*batch"]:
-        """Return the distance of the moved disk from the goal (m).
+        """Return the distance of the target disk from the goal (m).
 
         Raises:
-            BadScene: there is no such disk.
+            BadScene: the scene has no disk with this index.
         """
         return norm(self._to_goal(self._moved(state)))
 
@@ -44,15 +45,15 @@ class PushToGoal(AbstractTask):
         return self.distance(state) + self.alignment * (1 - cosine)
 
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
-        """Return whether the moved disk is within its tolerance of the goal."""
+        """Return whether the target disk is within the tolerance of the goal."""
         return self.distance(state) <= self.tolerance * scene.radius[..., self.moved]
 
     def _moved(self, state: State) -> Float[Array, "*batch 2"]:
-        # JAX would take the last disk for one that is not there.
+        # JAX would clamp an index out of range to the last disk.
         if not 0 <= self.moved < state.body_count:
             raise BadScene(
-                f"task: moved is {self.moved}, counted from 0, and the number of disks "
-                f"{state.body_count}; give the index of one of them."
+                f"task: moved is {self.moved}, but the scene has {state.body_count} "
+                f"disks; give an index from 0 to {state.body_count - 1}."
             )
         return state.position[..., self.moved, :]
 

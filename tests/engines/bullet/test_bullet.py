@@ -141,7 +141,5 @@ def test_every_disk_that_bullet_has_a_group_for_slides_and_one_more_is_refused()
         moved, np.broadcast_to(moved[:1], moved.shape), atol=1e-6
     )
     assert moved.min() > 1e-4
-    with pytest.raises(
-        BadScene, match="has 31 disks; Bullet has collision groups for 30"
-    ):
+    with pytest.raises(BadScene, match="has 31 disks; Bullet supports at most 30"):
         roll_out(make_engine("bullet"), *in_a_row(31))

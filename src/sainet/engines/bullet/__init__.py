@@ -1,5 +1,5 @@
-"""Bullet, the paper's engine, on the host: one world for each process (extra `bullet`).
+"""Bullet, the paper's engine, on the host: one world per process (extra `bullet`).
 
-`world` turns one push into PyBullet calls, `pool` spreads pushes over processes, and
-`engine` gives both the interface of every other engine.
+`world` simulates one push with PyBullet, `pool` distributes pushes over processes, and
+`engine` implements the interface of all engines.
 """

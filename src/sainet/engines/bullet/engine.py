@@ -1,4 +1,4 @@
-"""Bullet behind the interface of every engine."""
+"""Bullet behind the common interface of all engines."""
 
 import sys
 from importlib.util import find_spec
@@ -17,41 +17,41 @@ from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 if TYPE_CHECKING:
     from sainet.engines.bullet.world import Job
 
-_NEWEST_PYTHON = (3, 11)  # that PyBullet has wheels for
+_NEWEST_PYTHON = (3, 11)  # with PyBullet wheels
 
-MOST_DISKS = 30  # each has a bit of its own in a mask of 31, the first is for all
+MOST_DISKS = 30  # one bit per disk in a collision mask of 31; all share the first bit
 
 
 class BulletEngine(AbstractEngine):
-    """The engine of the paper, in DIRECT mode.
+    """Bullet, the paper's engine, in DIRECT mode.
 
-    It works on the host and has no gradient. (Within a compiled function it would have
-    to be called back: with several CPU devices JAX then waits for itself.) The batch is
-    shared out to a process for each core.
+    It runs on the host and has no gradient. (A compiled function would need a callback,
+    which deadlocks JAX with several CPU devices.) Batches are distributed over one
+    process per core.
     """
 
     def __check_init__(self) -> None:
-        """Raise `MissingExtra` without PyBullet."""
+        """Raise `MissingExtra` if PyBullet is not installed."""
         if find_spec("pybullet") is None:
             raise MissingExtra(_how_to_install())
 
     @property
     def on_host(self) -> bool:
-        """It is."""
+        """True: Bullet runs outside JAX."""
         return True
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls.
 
         Raises:
-            BadScene: more disks than Bullet has collision groups for.
+            BadScene: the scene has more disks than Bullet has collision groups.
         """
         from sainet.engines.bullet.pool import roll_everywhere
 
         if scene.body_count > MOST_DISKS:
             raise BadScene(
-                f"scene: it has {scene.body_count} disks; Bullet has collision groups "
-                f"for {MOST_DISKS} of them. Take fewer, or the planar engine."
+                f"scene has {scene.body_count} disks; Bullet supports at most "
+                f"{MOST_DISKS}. Use fewer disks or the planar engine."
             )
         batch = scene.batch_shape
         moved = roll_everywhere(_jobs(scene, initial, controls))
@@ -62,7 +62,7 @@ class BulletEngine(AbstractEngine):
 
 
 def _jobs(scene: Scene, initial: State, controls: Controls) -> list["Job"]:
-    """Return each push of a batch as plain numbers."""
+    """Return the numbers that define each push of a batch."""
     from sainet.engines.bullet.world import Driven, Job
 
     axes = len(scene.batch_shape)

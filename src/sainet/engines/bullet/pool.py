@@ -1,4 +1,4 @@
-"""Pushes spread over processes, one PyBullet world in each."""
+"""Distribution of pushes over processes, with one PyBullet world in each."""
 
 import multiprocessing
 from concurrent.futures import Executor
@@ -10,17 +10,18 @@ import numpy as np
 from sainet.engines.bullet.world import Job, Moved, roll_jobs
 from sainet.runs.workers import core_count, spawned_pool, worker_lost
 
-_FEW = 8  # pushes for which asking other processes does not pay
-_SHARES = 4  # of the work that each process gets: their speeds differ
+_FEW = 8  # pushes: up to here, one process is faster than several
+_SHARES = 4  # parts of the work per process, because processes differ in speed
 
 
 def roll_everywhere(jobs: list[Job]) -> Moved:
-    """Simulate pushes on all cores; the same bits as one after the other.
+    """Return the motion of pushes simulated on all cores, byte-identical to one core.
 
-    A process that is itself a worker does them alone: its siblings use the cores.
+    In a worker process the pushes run in that process: the other workers use the
+    remaining cores.
 
     Raises:
-        SainetError: a process was ended from outside; the next call gets new ones.
+        SainetError: a process was killed; the next call starts new processes.
     """
     if len(jobs) <= _FEW or multiprocessing.parent_process() is not None:
         return roll_jobs(jobs)
@@ -29,7 +30,7 @@ def roll_everywhere(jobs: list[Job]) -> Moved:
     try:
         done = list(_pool().map(roll_jobs, shares))
     except KeyboardInterrupt:
-        _pool.cache_clear()  # an interrupted process takes no more jobs
+        _pool.cache_clear()  # interrupted processes accept no more jobs
         raise
     except BrokenProcessPool:
         _pool.cache_clear()

@@ -1,4 +1,4 @@
-"""PyBullet, imported without the line that it prints."""
+"""Import of PyBullet without its banner."""
 
 import ctypes
 import os
@@ -10,7 +10,7 @@ from typing import Any
 
 @lru_cache
 def load_pybullet() -> Any:  # noqa: ANN401
-    """Return PyBullet's module, imported when it is first wanted."""
+    """Return the PyBullet module, imported on first use."""
     sys.stdout.flush()
     kept = [(os.dup(file), file) for file in (1, 2)]
     nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -18,7 +18,7 @@ def load_pybullet() -> Any:  # noqa: ANN401
         for _, file in kept:
             os.dup2(nowhere, file)
         module = import_module("pybullet")
-        ctypes.CDLL(None).fflush(None)  # it prints through C's buffer
+        ctypes.CDLL(None).fflush(None)  # the banner is in C's output buffer
     finally:
         for copy, file in kept:
             os.dup2(copy, file)

@@ -1,10 +1,10 @@
-"""One push in PyBullet, free of JAX so that worker processes start quickly.
+"""Simulation of one push in PyBullet, free of JAX so that processes start quickly.
 
 A disk is a cylinder on four small feet, two thirds of its radius from the centre, with
 its centre of mass in the plane of the table. A bare cylinder touches a plane at points
-of its rim that Bullet picks anew in every step: it tilts, turns while it coasts, and
-its friction depends on its heading by 9 %. The feet carry the weight as a uniform
-pressure would; `docs/theory.md` compares both.
+on its rim that Bullet selects anew in every step: it tilts, rotates while it coasts,
+and its friction varies with its heading by 9 %. The feet distribute the weight like a
+uniform pressure; `docs/theory.md` compares both.
 """
 
 import math
@@ -22,20 +22,20 @@ FOOT_ARM = 2 / 3  # of the radius: the mean distance of a uniform pressure
 _FOOT_RADIUS = 0.002  # m
 _CLEARANCE = 0.0005  # m, between the table and the cylinder
 _HEIGHT = 0.02  # m, of a disk
-_GUIDED_MASS = 1000.0  # kg, of a pusher that nothing stops
-_PUSHABLE = 1  # collision group of disks and pusher; each disk's table has its own
+_GUIDED_MASS = 1000.0  # kg: contacts do not slow a pusher that follows a path
+_PUSHABLE = 1  # collision group of disks and pusher; each table plane has its own
 _NEVER_SLEEPS = 2  # pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
 
 
 class Driven(NamedTuple):
-    """How a force drives the pusher."""
+    """Dynamics of a pusher driven by a force."""
 
     mass: float  # kg
     damping: float  # N s/m
 
 
 class Job(NamedTuple):
-    """One push, as plain numbers."""
+    """Numbers that define one push."""
 
     mass: Float[np.ndarray, " body"]
     radius: Float[np.ndarray, " body"]
@@ -45,33 +45,33 @@ class Job(NamedTuple):
     pusher_radius: float
     motion: Float[np.ndarray, "body 6"]
     pusher: Float[np.ndarray, " 4"]  # position and velocity
-    command: Float[np.ndarray, "time 2"]  # m of a path, or N
+    command: Float[np.ndarray, "time 2"]  # positions (m) or forces (N)
     field: tuple[np.ndarray, np.ndarray, float] | None  # wave, phase, amplitude
-    driven: Driven | None  # None: it follows a path
+    driven: Driven | None  # None: the pusher follows a path
     time_step: float
 
 
 class Moved(NamedTuple):
-    """How a push goes: the states after each step."""
+    """States of disks and pusher after each step."""
 
     motion: Float[np.ndarray, "time body 6"]
     pusher: Float[np.ndarray, "time 4"]
 
 
 class World:
-    """A PyBullet client that is made once and emptied before each push.
+    """PyBullet client that is created once and emptied before each push.
 
-    Bullet keeps contacts, and the impulses it found there, from step to step. An
-    empty world has none, so a push gives the same bits whatever was simulated before.
+    Bullet keeps contacts and their impulses from step to step. An empty world has
+    neither, so the result of a push does not depend on earlier pushes.
     """
 
     def __init__(self) -> None:
-        """Connect."""
+        """Connect to PyBullet in DIRECT mode."""
         self._bullet = load_pybullet()
         self._client = self._bullet.connect(self._bullet.DIRECT)
 
     def roll(self, job: Job) -> Moved:
-        """Simulate one push."""
+        """Return the states of one push after each step."""
         self._build(job)
         count, steps = len(job.mass), len(job.command)
         motion = np.empty((steps + 1, count, 6))
@@ -95,7 +95,7 @@ class World:
             physicsClientId=client,
         )
         self._bullet.setGravity(0, 0, -GRAVITY, physicsClientId=client)
-        # Bullet multiplies the coefficients of two surfaces: these give what is asked.
+        # Bullet multiplies the coefficients of two surfaces.
         self._root = math.sqrt(max(job.disk_friction, 1e-12))
         indices = range(len(job.mass))
         self._tables = [self._add_table(job, index) for index in indices]
@@ -103,7 +103,7 @@ class World:
         self._pusher = self._add_pusher(job)
 
     def _add_table(self, job: Job, index: int) -> int:
-        """Add a plane that only this disk feels: its friction is that disk's own."""
+        """Return a new plane that only one disk touches, with friction of its own."""
         client = self._client
         shape = self._bullet.createCollisionShape(
             self._bullet.GEOM_PLANE, physicsClientId=client
@@ -130,8 +130,8 @@ class World:
         return body
 
     def _disk_shape(self, radius: float, angle: float) -> int:
-        # Bullet's friction cone is along the table's axes, and round only for a foot
-        # at 45 degrees to them: there a kick moves the foot alike along both.
+        # Bullet applies friction along the axes of the table. Only for a foot at 45
+        # degrees to these axes does an impulse move the foot equally along both.
         turns = [2 * math.pi * (foot + 0.5) / FEET - angle for foot in range(FEET)]
         arm = FOOT_ARM * radius
         feet = [[arm * math.cos(t), arm * math.sin(t), _FOOT_RADIUS] for t in turns]
@@ -157,7 +157,7 @@ class World:
         body = self._bullet.createMultiBody(
             mass, shape, basePosition=middle, physicsClientId=client
         )
-        # Without inertia Bullet never turns it.
+        # Bullet never rotates a body with zero inertia.
         self._set_surface(body, job.pusher_friction / self._root, [0, 0, 0])
         self._meet(body, _PUSHABLE)
         self._bullet.resetBaseVelocity(body, [vx, vy, 0], [0, 0, 0], client)
@@ -196,7 +196,7 @@ class World:
             )
 
     def _drive(self, job: Job, pusher: np.ndarray, command: np.ndarray) -> None:
-        """Guide the pusher, and carry its weight: no table does."""
+        """Apply the command and cancel gravity: no plane supports the pusher."""
         body, client = self._pusher, self._client
         if job.driven is None:
             vx, vy = (command - pusher[0:2]) / job.time_step
@@ -210,7 +210,7 @@ class World:
         )
 
     def _disks(self, before: np.ndarray, time_step: float) -> np.ndarray:
-        """Return the packed motion; velocities are what the places tell."""
+        """Return the packed motion; velocities are differences of poses."""
         after = np.empty_like(before)
         for row, (body, old) in enumerate(zip(self._bodies, before, strict=True)):
             (x, y, _), turn = self._bullet.getBasePositionAndOrientation(
@@ -248,9 +248,9 @@ _world: World | None = None
 
 
 def roll_jobs(jobs: list[Job]) -> Moved:
-    """Simulate pushes one after the other in this process; stacked, float32."""
+    """Return the stacked motion (float32) of pushes simulated in this process."""
     global _world  # noqa: PLW0603
-    with _lock:  # PyBullet knows nothing of threads
+    with _lock:  # PyBullet is not thread-safe
         _world = _world or World()
         moved = [_world.roll(job) for job in jobs]
     stacked = (np.stack(parts).astype(np.float32) for parts in zip(*moved, strict=True))
