@@ -229,11 +229,11 @@ def test_a_damaged_file_is_named(tmp_path, text, says):
     [
         ("pusher_friction", 0.2, 0.1, 0.25, None),
         ("pusher_friction", 0.2, 0.05, 0.25, "anything from 0.05 to 0.25"),
-        ("pusher_friction", 1.99, 1.5, 2.0, "it is at the end of what is looked at"),
-        ("pressure_radius_ratio", 0.1, 0.1, 0.11, "the end of what is looked at"),
+        ("pusher_friction", 1.99, 1.5, 2.0, "it is at the edge of the search range"),
+        ("pressure_radius_ratio", 0.1, 0.1, 0.11, "the edge of the search range"),
         ("camera_x_mm", 0.0, -0.2, 0.2, None),
         ("camera_x_mm", -1.0, -2.2, 0.2, "anything from -2.2 to 0.2"),
-        ("camera_y_mm", -4.99, -5.0, -4.0, "looked at, -5 to 5"),
+        ("camera_y_mm", -4.99, -5.0, -4.0, "search range, -5 to 5"),
     ],
 )
 def test_a_wide_interval_is_doubted(name, value, low, high, says):
@@ -245,7 +245,7 @@ def test_a_wide_interval_is_doubted(name, value, low, high, says):
 def test_scenes_without_friction_are_refused_and_nothing_stays(store, tmp_path):
     arrays = store.read(slice(None)) | {"table_friction": np.zeros(24, np.float32)}
     slippery = write(tmp_path / "data", store.info, arrays)
-    with pytest.raises(BadStore, match="table_friction is 0; .* around a friction"):
+    with pytest.raises(BadStore, match="table_friction is 0; .* with a positive one"):
         identify_into(slippery, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -282,7 +282,7 @@ def test_pushes_of_all_lengths_and_looks_count_alike(tmp_path, caplog):
     found = identify(write(tmp_path / "data", info, arrays))
     (table,) = [e for e in found.estimates if e.name == "table_friction"]
     assert table.start == pytest.approx(0.2)
-    assert "table_friction differs from push to push, 0.1 to 0.3" in caplog.text
+    assert "table_friction varies between pushes, 0.1 to 0.3" in caplog.text
     assert caplog.text.count("differs") == 1
     assert found.pushes == 8
     assert found.before_mm > 0

@@ -65,7 +65,7 @@ def test_what_was_identified_is_said(tmp_path):
     write_json(tmp_path / "identified.json", found)
     page = page_of(tmp_path)
     assert "Pusher friction: 0.31 [0.3, 0.32], 0.25 before." in page
-    assert "The data cannot tell spin: it never spins." in page
+    assert "spin is not identifiable: it never spins." in page
     assert "Mean errors of 12 pushes: position 2.00 mm before" in page
 
 

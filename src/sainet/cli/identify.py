@@ -22,7 +22,7 @@ class Identify:
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:
-        """Identify the parameters and say what the data cannot tell."""
+        """Identify the parameters and print those that are not identifiable."""
         use_devices(None)
         from sainet.datasets.store import open_store
         from sainet.identification.identify import identify_into

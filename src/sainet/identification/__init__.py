@@ -1,1 +1,1 @@
-"""Fitting an engine's own parameters to pushes that were observed."""
+"""Estimation of engine parameters and the camera offset from observed pushes."""

@@ -1,4 +1,4 @@
-"""Fit the planar engine's parameters to observed pushes, by gradient through it."""
+"""Estimation of the planar engine's parameters, by gradients through the engine."""
 
 import logging
 from collections.abc import Mapping, Sequence
@@ -30,17 +30,17 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Identified:
-    """What was found, and how much better the engine is for it."""
+    """Estimated parameters, and the errors of the engine before and after."""
 
     estimates: tuple[Estimate, ...]
     pushes: int
-    before_mm: float  # mean position error where the pushes were observed
+    before_mm: float  # mean position error at the observed steps
     after_mm: float
     before_deg: float
     after_deg: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON values; `values` is what an engine is made of."""
+        """Return JSON values; `values` are the parameters of an engine."""
         values = {estimate.name: estimate.value for estimate in self.estimates}
         return {"values": values, **asdict(self)}
 
@@ -48,7 +48,7 @@ class Identified:
 def identify_into(
     store: Store, out: Path, *, on_try: Try = lambda error: None
 ) -> dict[str, Any]:
-    """Identify an engine's parameters into a run folder; again is no work.
+    """Return the parameters in a run folder, identified there if it is unfinished.
 
     Args:
         store: see `identify`.
@@ -56,12 +56,12 @@ def identify_into(
         on_try: see `identify`.
 
     Returns:
-        What `Identified.to_dict` says, as it is kept in `identified.json`.
+        The content of `identified.json`, see `Identified.to_dict`.
 
     Raises:
-        RunConflict: the folder holds something else.
+        RunConflict: the folder belongs to another run.
         BadStore: see `identify`.
-        BadInput: the folder was finished and is damaged.
+        BadInput: the folder is finished but damaged.
     """
     settings = {"command": "identify", "data": store.content, "parameters": NAMES}
     check_store(store)
@@ -81,9 +81,9 @@ def _read_found(out: Path) -> dict[str, Any]:
 
 
 def check_store(store: Store) -> None:
-    """Raise `BadStore` if no parameter can be identified from such pushes."""
+    """Raise `BadStore` if no parameter can be identified from these pushes."""
     if not store.read(slice(None), ("pose_observed",))["pose_observed"].any():
-        raise BadStore(f"{store.path}: no pose was observed; there is nothing to fit.")
+        raise BadStore(f"{store.path}: no pose was observed; give observed pushes.")
     if store.info.kind != "robot":
         raise BadStore(
             f"{store.path}: kind is {store.info.kind!r}; parameters are identified "
@@ -92,26 +92,27 @@ def check_store(store: Store) -> None:
     for name, values in store.read(slice(None), FRICTIONS).items():
         if not values.mean() > 0:
             raise BadStore(
-                f"{store.path}: {name} is {values.mean():g}; parameters are looked for "
-                "around a friction: import or generate the pushes with one."
+                f"{store.path}: {name} is {values.mean():g}; identification starts at "
+                "this value, so import or generate the pushes with a positive one."
             )
 
 
 def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
-    """Fit frictions, pressure distribution and where the camera sees the disks.
+    """Return estimates of frictions, pressure distribution and camera offset.
 
-    Nonlinear least squares (SciPy, robust against outliers) on position and rotation at
-    the observed steps, each measured by how wrong the engine is at the start. The 95 %
-    intervals are of a bootstrap over pushes, each resample one Gauss-Newton step away.
-    What the data cannot tell stays as the scenes have it, and the rest is fitted again.
+    Nonlinear least squares (SciPy, robust against outliers) on the position and
+    rotation errors at the observed steps, divided by the initial errors of the engine.
+    The 95 % intervals are a bootstrap over pushes, with one Gauss-Newton step for each
+    resample. Parameters that are not identifiable keep their initial values, and the
+    others are estimated again.
 
     Args:
-        store: of pushes along paths, observed at their ends at least.
-        on_try: told the error of all values that are tried, root mean square; at the
-            start it is about 1.
+        store: pushes along paths, with observed final poses at least.
+        on_try: called with the root mean square error of each trial solution; about 1
+            at the start.
 
     Raises:
-        BadStore: nothing of its pushes was observed, or forces drive them.
+        BadStore: no pose was observed, or forces drive the pusher.
     """
     check_store(store)
     parts = samples(store)
@@ -147,8 +148,8 @@ def _tell_of_one_value(store: Store, start: Mapping[str, float]) -> None:
     for name, values in store.read(slice(None), FRICTIONS).items():
         if name in start and np.ptp(values) > 0:
             _log.warning(
-                "%s: %s differs from push to push, %.3g to %.3g; one value of it takes "
-                "their place, and their mean if the pushes cannot tell one.",
+                "%s: %s varies between pushes, %.3g to %.3g; one estimate replaces "
+                "these values, or their mean if it is not identifiable.",
                 *(store.path, name, values.min(), values.max()),
             )
 
@@ -179,9 +180,9 @@ def _scale(values: Mapping[str, float], parts: Sequence[Sample]) -> Scale:
 def _mean_errors(
     values: Mapping[str, float], parts: Sequence[Sample]
 ) -> tuple[float, float]:
-    """Return mean errors (mm, degrees) over pushes, where they were observed."""
+    """Return mean errors (mm, degrees) over the observed steps of all pushes."""
     errors = [_raw_errors(values, part) for part in parts]
-    # Over each push first: of some more poses are looked at than of others.
+    # Average over each push first, because pushes differ in their observed steps.
     place = [np.linalg.norm(e[..., :2], axis=-1).mean(axis=(1, 2)) for e in errors]
     turn = [np.abs(e[..., 2]).mean(axis=(1, 2)) for e in errors]
     return (

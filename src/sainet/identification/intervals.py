@@ -1,4 +1,4 @@
-"""How well the data tell a parameter: a bootstrap over pushes."""
+"""Intervals of identified parameters: a bootstrap over pushes."""
 
 from collections.abc import Mapping, Sequence
 
@@ -16,9 +16,9 @@ from sainet.identification.residuals import Sample, Scale, residuals, slopes
 _RESAMPLES = 2_000
 _INTERVAL = (2.5, 97.5)  # percent
 _BOOTSTRAP = 0x1DE47
-_RIDGE = 1e-6  # of all curvature; what has less of it than that is not told
-# A resample holds none of k pushes with a probability below e^-k, and then takes no
-# step: from four on these are fewer than either tail of the interval.
+_RIDGE = 1e-6  # fraction of all curvature, below which a parameter has no effect
+# A resample contains none of k pushes with a probability below e^-k, and then its step
+# is zero: from four pushes on, this is rarer than either tail of the interval.
 _LEAST_PUSHES = 4
 
 
@@ -28,10 +28,10 @@ def intervals(
     scale: Scale,
     parts: Sequence[Sample],
 ) -> dict[str, tuple[float, float]]:
-    """Return the 95 % interval of each free parameter, over pushes like these.
+    """Return the 95 % interval of each free parameter.
 
-    Of a parameter that fewer than four pushes tell it is all that is looked at: pushes
-    without a slope resample to no step at all, which looks like certainty and is none.
+    A parameter that affects fewer than four pushes has the whole search range as its
+    interval: pushes with zero slope resample to zero steps, a false certainty.
     """
     at = {name: to_coordinate(name, value) for name, value in values.items()}
     matrices, vectors = [], []
@@ -41,22 +41,24 @@ def intervals(
         matrices.append(np.einsum("pn,pni,pnj->pij", weight, slope, slope))
         vectors.append(np.einsum("pn,pni,pn->pi", weight, slope, error))
     matrix, vector = np.concatenate(matrices), np.concatenate(vectors)
-    told = _is_told(matrix)
-    if not told.any():  # and a step may have no solution
+    identifiable = _is_identifiable(matrix)
+    if not identifiable.any():  # a Gauss-Newton step may have no solution
         return {name: BOUNDS[name] for name in free}
     steps = _resampled_steps(matrix, vector)
     draws = np.clip(np.array([at[name] for name in free]) - steps, *bounds_of(free))
     lows, highs = np.percentile(draws, _INTERVAL, axis=0).tolist()
     return {
         name: (from_coordinate(name, low), from_coordinate(name, high))
-        if is_told
+        if is_identifiable
         else BOUNDS[name]
-        for name, low, high, is_told in zip(free, lows, highs, told, strict=True)
+        for name, low, high, is_identifiable in zip(
+            free, lows, highs, identifiable, strict=True
+        )
     }
 
 
-def _is_told(matrix: Float[np.ndarray, "push p p"]) -> Bool[np.ndarray, " p"]:
-    """Whether pushes tell each parameter, even without the three that tell it best."""
+def _is_identifiable(matrix: Float[np.ndarray, "push p p"]) -> Bool[np.ndarray, " p"]:
+    """Return whether a parameter affects more than its three most affected pushes."""
     curvature = np.sort(np.einsum("pii->pi", matrix), axis=0)
     return curvature[: 1 - _LEAST_PUSHES].sum(axis=0) > _ridge(matrix)
 
@@ -68,7 +70,7 @@ def _ridge(matrix: Float[np.ndarray, "push p p"]) -> float:
 def _resampled_steps(
     matrix: Float[np.ndarray, "push p p"], vector: Float[np.ndarray, "push p"]
 ) -> Float[np.ndarray, "resample p"]:
-    """Return the Gauss-Newton step from the solution on each resample of the pushes."""
+    """Return the Gauss-Newton step from the solution for each resample."""
     pushes, size = vector.shape
     rng = np.random.default_rng(_BOOTSTRAP)
     counts = rng.multinomial(pushes, np.full(pushes, 1 / pushes), _RESAMPLES)

@@ -1,4 +1,4 @@
-"""The parameters of the planar engine, and of its camera, that pushes may tell."""
+"""Identifiable parameters: those of the planar engine, and the camera offset."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -18,28 +18,25 @@ BOUNDS = {
     RATIO: (0.1, 1.0),
     **dict.fromkeys(CAMERA, (-5.0, 5.0)),
 }
-_VAGUE = 3.0  # ratio of the ends of an interval, from which a value is not told
-_VAGUE_MM = 2.0  # their difference, of an offset
-_AT_BOUND = 0.01  # share of a bound, so near to which a value is at it
+_VAGUE = 3.0  # ratio of interval ends above which a parameter is not identifiable
+_VAGUE_MM = 2.0  # the same for offsets: difference of interval ends
+_AT_BOUND = 0.01  # relative distance from a bound at which a value counts as at it
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the data say of one parameter."""
+    """Estimate of one parameter."""
 
     name: str
-    value: float  # where the data cannot tell it: that of before
+    value: float  # the initial value if the parameter is not identifiable
     low: float  # of the 95 % interval
     high: float
-    start: float  # before
-    doubt: str | None = None  # why the data cannot tell it, if so
+    start: float  # initial value
+    doubt: str | None = None  # why the parameter is not identifiable; None if it is
 
 
 def to_coordinate(name: str, value: float) -> float:
-    """Return where a value lies on the line that it is looked for on.
-
-    That of its logarithm; an offset, which has a sign, is looked for itself.
-    """
+    """Return the optimised coordinate: log(value), or a signed offset itself."""
     return value if name in CAMERA else math.log(value)
 
 
@@ -49,7 +46,7 @@ def from_coordinate(name: str, coordinate: float) -> float:
 
 
 def values_at(coordinates: Mapping[str, Float[Array, ""]]) -> dict[str, Array]:
-    """Return values at coordinates, all in JAX."""
+    """Return the values at coordinates, as JAX arrays."""
     return {n: x if n in CAMERA else jnp.exp(x) for n, x in coordinates.items()}
 
 
@@ -61,26 +58,26 @@ def bounds_of(names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def doubt(name: str, value: float, low: float, high: float) -> str | None:
-    """Say why the data cannot tell a parameter, if they cannot.
+    """Return why a parameter is not identifiable, or None if it is.
 
     Args:
-        name: of the parameter.
-        value: where the errors are least.
-        low: end of the 95 % interval.
-        high: its other end.
+        name: the parameter.
+        value: its least-squares estimate.
+        low: lower end of the 95 % interval.
+        high: upper end of the interval.
     """
     least, most = BOUNDS[name]
     if (low, high) == (least, most):
-        return f"too few pushes depend on it: any of {least:g} to {most:g} may do"
+        return f"too few pushes depend on it: anything from {least:g} to {most:g} fits"
     if value - least < _AT_BOUND * abs(least) or most - value < _AT_BOUND * most:
-        return f"it is at the end of what is looked at, {least:g} to {most:g}"
+        return f"it is at the edge of the search range, {least:g} to {most:g}"
     if high - low > _VAGUE_MM if name in CAMERA else high > _VAGUE * low:
-        return f"anything from {low:.2g} to {high:.2g} does as well"
+        return f"anything from {low:.2g} to {high:.2g} fits as well"
     return None
 
 
 def names_for(scene: Scene) -> tuple[str, ...]:
-    """Return the parameters that can matter: one disk touches no other."""
+    """Return the parameters that affect a scene: one disk has no disk friction."""
     lone = scene.body_count == 1
     return tuple(name for name in NAMES if not (lone and name == "disk_friction"))
 
@@ -88,15 +85,15 @@ def names_for(scene: Scene) -> tuple[str, ...]:
 def starting_values(
     scenes: Sequence[Scene], names: tuple[str, ...]
 ) -> dict[str, float]:
-    """Return what all scenes say, on average."""
+    """Return the initial values: the means over all scenes."""
     known = {name: _mean([getattr(one, name) for one in scenes]) for name in FRICTIONS}
     known |= {RATIO: USUAL_RATIO, **dict.fromkeys(CAMERA, 0.0)}
     return {name: known[name] for name in names}
 
 
 def _mean(parts: Sequence[Float[Array, " push"]]) -> float:
-    # The rounding of a mean in single precision depends on how many there are. What
-    # pushes that are all alike were identified from must not: theirs is the first's.
+    # The rounding of a single-precision mean depends on the number of values. The mean
+    # of equal values must not: it is the first value.
     first, every = np.float64(parts[0]), np.float64(np.concatenate(parts))
     return float(jnp.mean(parts[0])) + float(every.mean() - first.mean())
 
@@ -104,7 +101,7 @@ def _mean(parts: Sequence[Float[Array, " push"]]) -> float:
 def with_values(
     scene: Scene, values: Mapping[str, Float[Array, ""]]
 ) -> tuple[Scene, PlanarEngine]:
-    """Return scenes and an engine with these values; differentiable in them."""
+    """Return scenes and an engine with these values, differentiable by the values."""
     frictions = [name for name in FRICTIONS if name in values]
     changed = eqx.tree_at(
         lambda s: [getattr(s, name) for name in frictions],
@@ -115,5 +112,5 @@ def with_values(
 
 
 def camera_at(values: Mapping[str, Float[Array, ""]]) -> Float[Array, "2"]:
-    """Return where the camera sees things, minus where the robot has them (m)."""
+    """Return the camera offset: camera-measured minus robot-measured position (m)."""
     return jnp.stack([values.get(name, jnp.zeros(())) for name in CAMERA]) / 1000

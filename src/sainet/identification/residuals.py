@@ -1,4 +1,4 @@
-"""How far an engine's predictions are from what was observed, and how that changes."""
+"""Errors of an engine at observed steps, and their derivatives by its parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,28 +14,28 @@ from sainet.datasets.store import Store
 from sainet.identification.parameters import camera_at, values_at, with_values
 from sainet.scenes.controls import move_controls, move_pusher
 
-_LOOKS = 8  # observed poses of a push that are compared, evenly over it
+_LOOKS = 8  # observed poses of a push that are compared, evenly spaced
 _BATCH = 256  # pushes at a time
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Pushes of one length, and at which steps they are looked at."""
+    """Pushes of one length, and the steps at which their poses are compared."""
 
     batch: PushBatch
-    steps: Int[np.ndarray, "push look"]  # of observed poses, the last one repeated
+    steps: Int[np.ndarray, "push look"]  # observed steps, the last one repeated
 
 
 @dataclass(frozen=True)
 class Scale:
-    """What errors are divided by: those of the starting values, root mean square."""
+    """Root mean square errors at the initial values, which scale all errors."""
 
     position: float  # m
     rotation: float  # rad
 
 
 def samples(store: Store) -> list[Sample]:
-    """Return the observed pushes of a store, some of one length at a time."""
+    """Return the observed pushes of a store, in batches of equal length."""
     lengths = store.read(slice(None), ("steps",))["steps"]
     found = []
     for length in np.unique(lengths):
@@ -51,7 +51,7 @@ def samples(store: Store) -> list[Sample]:
 
 
 def _looks(observed: np.ndarray) -> Int[np.ndarray, "push look"]:
-    """Return up to so many observed steps of each push, the last one always."""
+    """Return up to `_LOOKS` observed steps of each push, always with the last one."""
     count = min(_LOOKS, int(observed.sum(axis=1).max()))
     rows = []
     for push in observed:
@@ -86,7 +86,7 @@ def _residual(
 ) -> Array:
     error = pose_errors(values_at(free | fixed), batch, steps)
     scaled = error / jnp.broadcast_to(sizes, error.shape)
-    # A push counts once, however often it was looked at.
+    # Every push has the same weight, whatever the number of compared steps.
     return scaled.reshape(len(scaled), -1) / jnp.sqrt(1.0 * steps.shape[1])
 
 
@@ -96,7 +96,7 @@ _slope = eqx.filter_jit(jax.jacfwd(_residual))
 def residuals(
     coordinates: Mapping[str, float], scale: Scale, sample: Sample
 ) -> Float[np.ndarray, "push number"]:
-    """Return the scaled errors of each push."""
+    """Return the scaled errors of each push (dimensionless)."""
     found = _residual(*_arguments(coordinates, (), scale, sample))
     return np.asarray(found, np.float64)
 
@@ -107,7 +107,7 @@ def slopes(
     scale: Scale,
     sample: Sample,
 ) -> Float[np.ndarray, "push number parameter"]:
-    """Return derivatives by the free parameters, forward through the engine."""
+    """Return forward-mode derivatives of the scaled errors by the free parameters."""
     found = _slope(*_arguments(coordinates, free, scale, sample))
     return np.stack([np.asarray(found[name], np.float64) for name in free], axis=-1)
 

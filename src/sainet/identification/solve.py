@@ -1,4 +1,4 @@
-"""Nonlinear least squares over the parameters that are free."""
+"""Nonlinear least squares over the free parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -8,9 +8,9 @@ from scipy.optimize import least_squares
 from sainet.identification.parameters import bounds_of, from_coordinate, to_coordinate
 from sainet.identification.residuals import Sample, Scale, residuals, slopes
 
-Try = Callable[[float], None]  # told the error of all, root mean square
+Try = Callable[[float], None]  # called with the root mean square of all errors
 
-_INSIDE = 1e-3  # of a bound, where a search begins
+_INSIDE = 1e-3  # distance of initial coordinates from the bounds
 
 
 def solve(
@@ -21,7 +21,7 @@ def solve(
     *,
     on_try: Try,
 ) -> dict[str, float]:
-    """Return the best values of the free parameters, the others as they were."""
+    """Return all values, with the free parameters at the least-squares solution."""
     bounds = bounds_of(free)
     before = {name: to_coordinate(name, value) for name, value in start.items()}
 

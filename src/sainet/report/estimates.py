@@ -12,7 +12,7 @@ _HEADINGS = ("parameter", "before", "value", "95 % interval")
 
 
 def print_estimates(found: Mapping[str, Any], console: Console) -> None:
-    """Print each parameter, what the data cannot tell, and what it was good for.
+    """Print each estimate, parameters that are not identifiable, and the errors.
 
     Args:
         found: what `Identified.to_dict` returns.
@@ -35,7 +35,7 @@ def print_estimates(found: Mapping[str, Any], console: Console) -> None:
     for estimate in found["estimates"]:
         if estimate["doubt"]:
             name = estimate["name"].replace("_", " ")
-            console.print(Text(f"The data cannot tell {name}: {estimate['doubt']}."))
+            console.print(Text(f"{name} is not identifiable: {estimate['doubt']}."))
     console.print(
         Text(
             f"Mean errors where {found['pushes']} pushes were observed: position "

@@ -101,7 +101,7 @@ def _estimates(identified: dict[str, Any]) -> Iterator[str]:
     for estimate in identified.get("estimates", ()):
         name = estimate["name"].replace("_", " ")
         if estimate["doubt"]:
-            yield f"The data cannot tell {name}: {estimate['doubt']}."
+            yield f"{name} is not identifiable: {estimate['doubt']}."
         else:
             yield (
                 "{name}: {value:.3g} [{low:.3g}, {high:.3g}], {start:.3g} before."
