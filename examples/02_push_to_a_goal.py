@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from sainet import Scene, load_dynamics
+from sainet import Scene, load_model
 from sainet.control.episode import Turn, run_episode
 from sainet.engines import make_engine
 from sainet.planning import make_planner
@@ -45,6 +45,6 @@ def tell(turn: Turn) -> None:
     print(f"{away:6.1f} mm to go: contact {push[0]:+.0f}, direction {push[1]:+.0f} deg")
 
 
-sain = load_dynamics("sain").dynamics
+sain = load_model("sain").dynamics
 episode = run_episode(robot, make_planner("greedy"), sain, task, scene, on_turn=tell)
 print(f"{episode.reason} after {len(episode.turns)} pushes")

@@ -98,11 +98,11 @@ _TABLES = {
 }
 _PREDICTED = {
     "Physics": "`physics`: Bullet, assumed masses and radii",
-    "Physics, calibrated": "`physics-calibrated`: Bullet, true ones",
+    "Physics, true properties": "`physics-true`: Bullet, true ones",
     "IN": "`in`: a network alone",
     "SAIN around Bullet": "`sain-bullet`: a network around `physics`, the paper's SAIN",
     "SAIN": "`sain`: around the planar engine, assumed ones",
-    "SAIN, calibrated": "`sain-calibrated`: around the planar engine, true ones",
+    "SAIN, true properties": "`sain-true`: around the planar engine, true ones",
 }
 
 

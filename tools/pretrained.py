@@ -11,19 +11,16 @@ who replaces some replaces all, and what docs/results.md says of them.
 
 import argparse
 import shutil
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.learning.config import FitConfig
 from sainet.runs.workers import worker_pool
 
 if TYPE_CHECKING:
-    from sainet.models.card import Card
     from sainet.studies.chain import Chain
     from sainet.studies.paper_setup import PaperSetup
     from sainet.studies.strokes import StrokeSetup
@@ -40,7 +37,7 @@ def main() -> None:
     parser.add_argument("--devices", type=int)
     options = parser.parse_args()
     use_devices(options.devices)
-    from sainet.models.registry import PRETRAINED
+    from sainet.models.library import PRETRAINED
     from sainet.studies.chain import Chain
     from sainet.studies.paper_setup import paper_setup
     from sainet.studies.strokes import stroke_setup
@@ -56,7 +53,7 @@ def main() -> None:
 
 def build(setup: "PaperSetup", into: Path) -> None:
     """Copy card and weights of each of the paper's networks."""
-    from sainet.models.registry import OF_PAPER
+    from sainet.models.library import OF_PAPER
 
     for name in OF_PAPER:
         (folder,) = setup.train((name,), (SEED,))[name]
@@ -65,7 +62,7 @@ def build(setup: "PaperSetup", into: Path) -> None:
 
 def build_strokes(setup: "StrokeSetup", into: Path) -> None:
     """Copy card and weights of each network of strokes."""
-    from sainet.models.registry import OF_STROKES
+    from sainet.models.library import OF_STROKES
 
     for name in OF_STROKES:
         _ship(name, setup.chain, setup.train(name), into)
@@ -73,19 +70,13 @@ def build_strokes(setup: "StrokeSetup", into: Path) -> None:
 
 def _ship(name: str, chain: "Chain", folder: str, into: Path) -> None:
     from sainet.models.card import CARD, WEIGHTS, read_card
-    from sainet.runs.documents import write_json
+    from sainet.runs.documents import write_document
 
     target = into / name
     target.mkdir(parents=True, exist_ok=True)
     shutil.copyfile(chain.out / folder / WEIGHTS, target / WEIGHTS)
-    write_json(target / CARD, whole_card(read_card(chain.out / folder)))
+    write_document(target / CARD, read_card(chain.out / folder))
     chain.say(f"{name} is in {target}")
-
-
-def whole_card(card: "Card") -> dict[str, Any]:
-    """Return a card with the settings of now: those that came later by default."""
-    now = asdict(FitConfig())
-    return card.to_dict() | {"config": {n: card.config.get(n, now[n]) for n in now}}
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from typing import Any
 from sainet.report.control_table import CHANCE
 from sainet.report.palette import styles_of
 
-_PHYSICS, _CALIBRATED, _ALONE = "physics", "physics-calibrated", "in"
+_PHYSICS, _CALIBRATED, _ALONE = "physics", "physics-true", "in"
 _BYSTANDER = "-bystander"
 ERRORS = {"pos_mm": "pos", "rot_deg": "rot"}
 FINAL_ERRORS = {"final_pos_mm": "final pos", "final_rot_deg": "final rot"}
@@ -96,7 +96,7 @@ def of_groups(
     Args:
         table: of the errors.
         against: the models that each model is compared with; by default every SAIN
-            with physics-calibrated and IN.
+            with physics-true and IN.
         errors: that are compared, and what they are called.
     """
     rows, comparisons = table["rows"], table["comparisons"]
@@ -169,7 +169,7 @@ def _worth(rows: Sequence[Row]) -> str:
         "true masses and radii in Bullet leave": _CALIBRATED,
         "learning around Bullet with wrong ones leaves": "sain-bullet",
         "learning around planar with wrong ones leaves": "sain",
-        "learning around planar with true ones leaves": "sain-calibrated",
+        "learning around planar with true ones leaves": "sain-true",
     }
     parts = [
         f"{words} {_slashed(_over_physics(rows, name, 'pos_mm'))}"

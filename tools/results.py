@@ -23,12 +23,12 @@ from typing import Any
 from headlines import main as write_headlines
 from readings import ERRORS, FINAL_ERRORS, of_control, of_errors, of_groups
 from receipts import RECEIPTS, keep, restore
+from sainet.engines.identified import CAMERA
 
 from sainet.control.record import read_record
 from sainet.control.trials import episode_file
-from sainet.engines.identified import CAMERA
 from sainet.learning.config import RESIDUAL_TUNING, FitConfig
-from sainet.models.registry import OF_STROKES
+from sainet.models.library import OF_STROKES
 from sainet.report.control_table import control_markdown
 from sainet.report.figures.video import write_film
 from sainet.report.tables import to_markdown
@@ -113,7 +113,7 @@ def _recorded() -> str:
     strokes = RUNS / "strokes-paper" / "test"
     made = ("--speed-mm-s", "10", "--pushes", "200", "--seed", "5")
     _run("generate", *_KIND.split(), *made, "--out", str(strokes))
-    models = ("physics", "physics-calibrated", *OF_STROKES)
+    models = ("physics", "physics-true", *OF_STROKES)
     simulated = ("evaluate", "--model", *models, "--data", str(strokes), "--steps", "0")
     return (
         f"`sainet import mitpush-endpoints ellip1_endpoints.csv --out {data}`; then "
@@ -401,12 +401,12 @@ def _median(times: list[float]) -> tuple[float, int]:
 _FIVE = (
     "five trainings of each network on 4,500 pushes of two disks, 10,000 iterations "
     "each; truth is Bullet with noise, and so is the engine of the rows Physics and "
-    "Physics, calibrated. SAIN around Bullet is the paper's SAIN; SAIN has the planar "
-    "engine inside, told the same wrong masses and radii; SAIN, calibrated the planar "
-    "engine told the true ones. Published rows are the paper's, whose noise, friction "
-    "of contacts and way to push are not known: ours were chosen before any result "
-    "(`docs/theory.md`, section 10), and section 11 says what of the published size of "
-    "Physics could not be reproduced."
+    "Physics, true properties. SAIN around Bullet is the paper's SAIN; SAIN has the "
+    "planar engine inside, told the same wrong masses and radii; SAIN, true properties "
+    "the planar engine told the true ones. Published rows are the paper's, whose "
+    "noise, friction of contacts and way to push are not known: ours were chosen "
+    "before any result (`docs/theory.md`, section 10), and section 11 says "
+    "what of the published size of Physics could not be reproduced."
 )
 _FORCE = "Of 480 steps of a push the first 200 are trained on and evaluated."
 _TOLD = (

@@ -29,7 +29,7 @@ _HOMES = {
     "fit": "sainet.learning.fit",
     "generate": "sainet.datasets.generate",
     "identify": "sainet.identification.identify",
-    "load_dynamics": "sainet.models.registry",
+    "load_model": "sainet.models.library",
     "make_engine": "sainet.engines",
     "make_planner": "sainet.planning",
     "open_store": "sainet.datasets.store",
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from sainet.learning.fit import fit
     from sainet.models.correctors.interaction import InteractionNetwork
     from sainet.models.dynamics import AbstractDynamics, predict
-    from sainet.models.registry import load_dynamics
+    from sainet.models.library import load_model
     from sainet.planning import make_planner
     from sainet.scenes.controls import ForceControls, PathControls
     from sainet.scenes.pushes import Push, PushGrid
@@ -82,7 +82,7 @@ __all__ = [
     "fit",
     "generate",
     "identify",
-    "load_dynamics",
+    "load_model",
     "make_engine",
     "make_planner",
     "open_store",

@@ -153,7 +153,7 @@ def test_shipped_networks_are_compared_where_they_fit(pushes):
     done = sainet(*words)
     assert {row["model"] for row in json.loads(done.stdout)["rows"]} == {
         "physics",
-        "physics-calibrated",
+        "physics-true",
     }
     # These pushes have the seed of those that the shipped ones were trained on.
     for name in ("in", "sain"):

@@ -13,14 +13,15 @@ import jax
 import numpy as np
 import pytest
 
+from models.samples import identified_folder
 from models.test_checkpoint import write_network
 from sainet.control import trials
 from sainet.control.config import ControlConfig
 from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trial import make_trial
-from sainet.control.trials import episode_file, run_trials
+from sainet.control.trials import episode_file, prepare, run_trials
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
-from sainet.runs.documents import read_json, write_json
+from sainet.runs.documents import read_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs.folders import CONFIG as CONFIG_FILE
 from sainet.scenes.recording import Recording
@@ -113,7 +114,6 @@ def test_a_network_trained_again_is_another_model(tmp_path):
     config = replace(CONFIG, model=str(write_network(net, seed=0)), trials=1, pushes=1)
     run_trials(config, out)
     write_network(net, seed=1)
-    trials.prepare.cache_clear()
     with pytest.raises(RunConflict, match="weights is"):
         run_trials(config, out)
 
@@ -122,9 +122,13 @@ def test_an_engine_identified_again_is_another_model(tmp_path, monkeypatch):
     monkeypatch.setattr(trials, "run_episode", lambda *args, **settings: None)
     mine, out = tmp_path / "mine", tmp_path / "out"
     config = replace(CONFIG, model=str(mine), trials=1)
-    write_json(mine / "identified.json", {"values": {"pusher_friction": 0.2}})
+    identified_folder(mine, pusher_friction=0.2)
     run_trials(config, out)
-    write_json(mine / "identified.json", {"values": {"pusher_friction": 0.3}})
+    loaded = prepare(config)[0].dynamics.engine.assumptions.pusher_friction
+    assert loaded == 0.2
+    identified_folder(mine, pusher_friction=0.3)
+    loaded = prepare(config)[0].dynamics.engine.assumptions.pusher_friction
+    assert loaded == 0.3, "the engine identified before runs on"
     with pytest.raises(RunConflict, match="weights is"):
         run_trials(config, out)
 
@@ -239,7 +243,7 @@ def test_an_episode_may_aim_closer_than_it_is_judged(tmp_path, monkeypatch):
         assert aimed[-1].tolerance == pytest.approx(aim * 0.1)
     # Trials from before there was this setting go on.
     told = [read_json(tmp_path / name / CONFIG_FILE) for name in ("1.0", "0.8")]
-    assert [one.get("aim") for one in told] == [None, 0.8]
+    assert [one["aim"] for one in told] == [1.0, 0.8]
 
 
 @pytest.mark.parametrize(

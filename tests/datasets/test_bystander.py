@@ -9,15 +9,16 @@ import pytest
 from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
 from sainet.datasets import bystander
-from sainet.datasets.assumed import simulate
 from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
 from sainet.datasets.bystander import FARTHEST, add_bystander, with_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
+from sainet.datasets.predictions import simulate
 from sainet.datasets.schema import variables
 from sainet.datasets.store import open_store
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
+from sainet.engines.simulator import simulator_named
 from sainet.models.frame import push_frame
 from sainet.runs.errors import BadStore
 
@@ -33,7 +34,7 @@ def store(request, tmp_path_factory):
         hold_steps=32,
         force_steps=80,
         noise_level="none",
-        assumed_engine=("planar", "planar-calibrated"),
+        assumed_engine=("planar", "planar-true"),
     )
     return generate(config, tmp_path_factory.mktemp("bystander") / request.param)
 
@@ -121,7 +122,7 @@ def test_the_assumed_engines_are_asked_again(wider):
     arrays = wider.read(slice(None))
     names = [str(push) for push in range(PUSHES)]
     for engine in wider.info.assumed_engines:
-        again = simulate(engine, arrays, wider.info, names)
+        again = simulate(simulator_named(engine), arrays, wider.info, names)
         np.testing.assert_allclose(again, arrays[f"simulated_{engine}"], atol=2e-6)
     # Wrong radii overlap at the start; true ones do not.
     moved = {
@@ -129,7 +130,7 @@ def test_the_assumed_engines_are_asked_again(wider):
         for name in wider.info.assumed_engines
     }
     assert moved["planar"][:, :2].max() > 1e-3
-    assert moved["planar-calibrated"][:, :2].max() < 2e-5
+    assert moved["planar-true"][:, :2].max() < 2e-5
 
 
 def test_the_seed_decides_and_it_is_made_once(store, tmp_path, monkeypatch):

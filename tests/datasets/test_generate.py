@@ -172,7 +172,7 @@ def test_no_room_in_a_later_chunk_is_found_before_any_work(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "engines", [{"engine": "bullet"}, {"assumed_engine": ("bullet-calibrated",)}]
+    "engines", [{"engine": "bullet"}, {"assumed_engine": ("bullet-true",)}]
 )
 def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines):
     require(find_spec("pybullet"), "PyBullet is not installed")

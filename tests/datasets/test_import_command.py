@@ -28,7 +28,7 @@ def test_physics_is_evaluated_on_what_was_imported(
     out = str(tmp_path / "out")
     assert run(["import", form, *sources[form], "--out", out, "--json"]) == 0
     assert json.loads(capfd.readouterr().out.splitlines()[-1])["pushes"] == 1
-    models = ["physics", "physics-calibrated"]
+    models = ["physics", "physics-true"]
     words = ["evaluate", "--model", *models, "--data", out, "--json", "--quiet"]
     assert run([*words, "--devices", "2"]) == 0
     found = json.loads(capfd.readouterr().out.splitlines()[-1])["rows"]

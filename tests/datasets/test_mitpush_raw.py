@@ -108,7 +108,7 @@ def test_the_store_is_like_any_other(imported):
     assert info.groups == ("abs-50", "abs-60")
     assert info.published == ()
     arrays = imported.read(slice(None))
-    batch = to_batch(arrays, info, simulated="planar-calibrated")
+    batch = to_batch(arrays, info, simulated="planar-true")
     assert int(batch.pose_observed.sum()) == 260
     assert arrays["radius"] == pytest.approx(0.0525)
 

@@ -74,7 +74,7 @@ def test_the_store_says_what_the_properties_say(imported):
         **{"table_friction": 0.3, "disk_friction": 0.2, "pusher_friction": 0.2},
     }.items():
         np.testing.assert_allclose(arrays[name] - np.float32(value), 0, atol=1e-7)
-    batch = to_batch(arrays, info, simulated="planar-calibrated")
+    batch = to_batch(arrays, info, simulated="planar-true")
     assert int(batch.pose_observed.sum()) == 96 + 72
     config = json.loads((imported.path / "config.json").read_text())
     assert config["bodies"] == ["far", "near"]

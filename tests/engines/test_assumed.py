@@ -8,9 +8,10 @@ import pytest
 from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
-from sainet.engines.assumed import AssumedProperties, calibrated
+from sainet.engines.assumed import AssumedProperties
 from sainet.engines.base import roll_out
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.engines.simulator import TRUE_PROPERTIES, Assumptions
 from sainet.runs.errors import UnknownName
 from sainet.scenes.scene import FrictionField
 
@@ -41,18 +42,18 @@ def test_one_disk_takes_the_first_assumed_properties():
     np.testing.assert_allclose(found.mass, [[0.896]] * 3)
 
 
-def test_none_keeps_the_truth_but_for_the_field():
+def test_none_keeps_the_scenes_values_but_no_friction_field():
     scene = scene_of(2)
-    knowing = AssumedProperties(PlanarEngine(), mass=None, radius=None, friction=None)
-    found = knowing.assume(scene)
+    wrapped = AssumedProperties(PlanarEngine(), Assumptions())
+    found = wrapped.assume(scene)
     for kept in ("mass", "radius", "table_friction"):
         np.testing.assert_array_equal(getattr(found, kept), getattr(scene, kept))
     assert found.friction_field is None
 
 
-def test_calibrated_knows_masses_and_radii_but_no_friction():
+def test_true_properties_are_masses_and_radii_and_no_friction():
     scene = scene_of(2)
-    found = calibrated(PlanarEngine()).assume(scene)
+    found = AssumedProperties(PlanarEngine(), TRUE_PROPERTIES).assume(scene)
     np.testing.assert_array_equal(found.mass, scene.mass)
     np.testing.assert_array_equal(found.radius, scene.radius)
     np.testing.assert_allclose(found.table_friction, [0.15] * 3)

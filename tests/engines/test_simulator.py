@@ -37,8 +37,7 @@ def test_slugs_differ_where_specifications_do():
 def test_the_built_engine_has_the_parameters():
     built = IDENTIFIED.build()
     assert built.engine.pressure_radius_ratio == IDENTIFIED.pressure_radius_ratio
-    assert built.pusher_friction == IDENTIFIED.assumptions.pusher_friction
-    assert built.mass is None
+    assert built.assumptions == IDENTIFIED.assumptions
 
 
 @pytest.mark.parametrize(
@@ -57,4 +56,4 @@ def test_impossible_values_are_refused_with_their_field(text: str, field: str):
 
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(UnknownName, match="planar-true"):
-        simulator_named("planar-calibrated")
+        simulator_named("planar-exact")

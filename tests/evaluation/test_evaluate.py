@@ -1,22 +1,24 @@
 """Whole evaluations of small stores."""
 
-from dataclasses import replace
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 
 from learning.stores import end_points_alone, info_of, made_up, quiet_store, write
 from models.samples import quick_dynamics
 from sainet.datasets.batch import to_batch
 from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties
+from sainet.engines.simulator import Assumptions
 from sainet.evaluation.evaluate import evaluate
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
-from sainet.models.named import NamedDynamics
+from sainet.models.identity import ModelId
+from sainet.models.library import load_model
+from sainet.models.model import Model
 from sainet.runs.errors import BadCheckpoint, BadInput, Diverged
 from sainet.scenes.state import State, Trajectory
 
@@ -43,7 +45,7 @@ class Rest(AbstractDynamics):
 
 
 def resting(name="rest", shift=0.0, card=None):
-    return NamedDynamics(name, Rest(jnp.float32(shift)), card)
+    return Model(ModelId(kind="in", name=name), Rest(jnp.float32(shift)), card)
 
 
 @pytest.fixture(scope="session")
@@ -157,15 +159,9 @@ def test_what_was_not_seen_within_the_steps_is_unknown_not_zero(recorded):
 
 def test_physics_that_knows_everything_makes_no_error(tmp_path_factory):
     store = quiet_store(tmp_path_factory.getbasetemp())
-    knowing = AssumedProperties(
-        make_engine("planar"), mass=None, radius=None, friction=None
-    )
-    models = [
-        NamedDynamics("truth", PhysicsDynamics(knowing)),
-        NamedDynamics(
-            "physics", PhysicsDynamics(AssumedProperties(make_engine("planar")))
-        ),
-    ]
+    exact = AssumedProperties(make_engine("planar"), Assumptions())
+    truth = ModelId(kind="physics", name="truth")
+    models = [Model(truth, PhysicsDynamics(exact)), load_model("physics")]
     errors = evaluate(models, store).errors
     for name, tolerance in (("pos_mm", 1e-3), ("rot_deg", 1e-3)):
         assert getattr(errors["truth"], name).max() < tolerance
@@ -173,14 +169,12 @@ def test_physics_that_knows_everything_makes_no_error(tmp_path_factory):
 
 
 CARD = Card(
-    model="in",
+    identity=ModelId(kind="in"),
     kind="robot",
     time_step=1 / 240,
-    inner_engine=None,
     truth_engine="planar",
-    assumed=None,
     data="",
-    data_seed=17,
+    data_seeds=(17,),
     weights="",
     config={},
     manifest={},
@@ -188,21 +182,21 @@ CARD = Card(
 
 
 def test_a_network_is_not_used_on_other_pushes_unless_forced(simulated):
-    card = replace(CARD, kind="direct-force")
+    card = structs.replace(CARD, kind="direct-force")
     with pytest.raises(BadCheckpoint, match="kind is 'direct-force'"):
         evaluate([resting(card=card)], simulated)
     evaluate([resting(card=card)], simulated, force=True)
 
 
 def test_recorded_pushes_of_the_training_are_no_test(recorded):
-    card = replace(CARD, data=recorded.content)
+    card = structs.replace(CARD, data=recorded.content)
     with pytest.raises(BadCheckpoint, match=r"was trained on them.*`force`"):
         evaluate([resting(card=card)], recorded)
     evaluate([resting(card=card)], recorded.first(PUSHES - 1))
 
 
 def test_predictions_of_a_network_are_those_of_its_rollout(simulated):
-    model = NamedDynamics("in", quick_dynamics("in", "robot"))
+    model = Model(ModelId(kind="in"), quick_dynamics("in", "robot"))
     rows = evaluate([model], simulated, steps=5).to_dict()["rows"]
     arrays = simulated.read(slice(None))
     batch = to_batch(arrays, simulated.info, steps=5)

@@ -7,7 +7,7 @@ from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.datasets.splits import fold_of_push, make_folds
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.folds import join_folds
-from sainet.models.registry import load_dynamics
+from sainet.models.library import load_model
 
 REPEATS = np.random.default_rng(0).permutation(np.repeat(np.arange(9), 3))
 
@@ -43,7 +43,7 @@ def test_another_seed_draws_other_folds():
 
 
 def test_the_errors_of_all_folds_are_those_of_the_whole_in_its_order(store):
-    models = [load_dynamics("physics")]
+    models = [load_model("physics")]
     folds = make_folds(store, 3)
     joined = join_folds([(fold, evaluate(models, fold.tests)) for fold in folds[::-1]])
     whole = evaluate(models, store)

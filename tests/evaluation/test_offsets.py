@@ -6,7 +6,7 @@ import pytest
 from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.offsets import EndOffsets, end_offsets
-from sainet.models.registry import load_dynamics
+from sainet.models.library import load_model
 from sainet.report.figures.engine_errors import draw_engine_errors
 
 
@@ -22,7 +22,7 @@ def test_its_size_is_the_error_of_the_evaluation(tmp_path):
     info = info_of(9, engine="recorded", seed=None, bodies=1)
     arrays = end_points_alone(made_up(info, lengths=[12, 8, 12] * 3))
     store = write(tmp_path / "data", info, arrays)
-    model = load_dynamics("physics")
+    model = load_model("physics")
     found, known = end_offsets(model, store), evaluate([model], store).errors["physics"]
     size = 1000 * np.hypot(found.along, found.across)
     np.testing.assert_allclose(size, known.final_pos_mm[:, 0], rtol=1e-4)

@@ -14,7 +14,6 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
-from sainet.engines.identified import FILE, beliefs_of, engine_of_beliefs, read_values
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.identification import intervals as intervals_module
 from sainet.identification.identify import identify, identify_into
@@ -25,11 +24,12 @@ from sainet.identification.parameters import (
     names_for,
     starting_values,
     to_coordinate,
+    to_engine,
     with_values,
 )
 from sainet.identification.residuals import Scale, residuals, samples, slopes
-from sainet.learning.assumed import find_assumed_engine
-from sainet.models.registry import load_dynamics
+from sainet.models.identified import FILE, read_identified
+from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.errors import BadInput, BadStore, RunConflict
 from sainet.scenes.controls import move_controls, move_pusher
 
@@ -177,51 +177,73 @@ def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
     out, tried = tmp_path / "mine", []
     result = identify_into(store, out, on_try=tried.append)
     assert tried[-1] < tried[0]
-    assert json.loads((out / FILE).read_text()) == result
-    model = load_dynamics(str(out))
+    assert read_identified(out) == result
+    model = load_model(str(out))
     assert model.name == "mine"
-    values = result["values"]
+    values = result.values
     offset = np.array([values["camera_x_mm"], values["camera_y_mm"]]) / 1000
-    np.testing.assert_allclose(model.dynamics.offset, offset)
+    np.testing.assert_allclose(model.dynamics.offset.vector, offset)
     engine = model.dynamics.dynamics.engine
-    assert engine.pusher_friction == values["pusher_friction"]
+    assert engine.assumptions.pusher_friction == values["pusher_friction"]
     assert isinstance(engine.engine, PlanarEngine)
     with pytest.raises(BadInput, match="of the planar engine, not of bullet"):
-        load_dynamics(str(out), engine="bullet")
+        load_model(str(out), engine="bullet")
     before = (out / FILE).stat().st_mtime_ns
     assert identify_into(store, out) == result
     assert (out / FILE).stat().st_mtime_ns == before
     with pytest.raises(RunConflict, match="data is"):
         identify_into(store.first(5), out)
-    (out / FILE).write_text(json.dumps({"values": values}))
-    with pytest.raises(BadInput, match=f"estimates is missing; delete {out}, then"):
+    (out / FILE).write_text("{}")
+    with pytest.raises(BadInput, match=f"{FILE}: .*missing.* Delete {out}, then"):
         identify_into(store, out)
     (out / FILE).unlink()  # as if it had been interrupted
-    for use in (load_dynamics, find_assumed_engine):
+    for use in (load_model, find_internal_engine):
         with pytest.raises(BadInput, match=f"{FILE}: missing, so .* 'sainet identify'"):
             use(str(out))
+
+
+def found_with(*, friction=0.3, ratio=0.5, camera=None, pushes=3, engine=None) -> str:
+    """A document of identified parameters."""
+    simulator = {
+        "engine": "planar",
+        "assumptions": {"pusher_friction": friction},
+        "pressure_radius_ratio": ratio,
+    }
+    errors = dict.fromkeys(("before_mm", "after_mm", "before_deg", "after_deg"), 1.0)
+    known = engine or {"simulator": simulator, "camera": camera or {}}
+    return json.dumps(
+        {"engine": known, "estimates": [], "pushes": pushes, "format_version": 2}
+        | errors
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("{}", "values is missing; delete .*, then run the command that made it"),
-        ('{"values": {"pusher_friction": -1}}', "values.pusher_friction is -1"),
-        ('{"values": {"grip": 0.3}}', "values.grip"),
-        ('{"values": {"pusher_friction": true}}', "pusher_friction is True"),
-        ('{"values": {"pressure_radius_ratio": 0}}', "0; it must be a positive number"),
-        (
-            '{"values": {"table_friction": 1%s}}' % ("0" * 400),
-            "it must be a positive number",
-        ),
-        ('{"values": {"camera_x_mm": "a"}}', "camera_x_mm is 'a'; it must be a number"),
-        ("{", "cannot be read as JSON"),
+        ("{}", "missing required field"),
+        (found_with(), None),
+        (found_with(engine={"simulator": {"engine": "pinball"}}), "engine"),
+        (found_with(ratio=0), "pressure_radius_ratio"),
+        (found_with(ratio=50), "pressure_radius_ratio"),
+        (found_with(friction=-1), "pusher_friction"),
+        (found_with(friction=True), "pusher_friction"),
+        (found_with(friction=1e30), "pusher_friction"),
+        (found_with(friction="%s"), "pusher_friction"),
+        (found_with(camera={"x": "a"}), "camera"),
+        (found_with(camera={"x": 3.0}), "camera"),
+        (found_with(pushes="many"), "pushes"),
+        ("{", "truncated"),
     ],
 )
 def test_a_damaged_file_is_named(tmp_path, text, says):
-    (tmp_path / FILE).write_text(text)
-    with pytest.raises(BadInput, match=says):
-        read_values(tmp_path)
+    (tmp_path / FILE).write_text(text.replace('"%s"', "1" + "0" * 400))
+    if says is None:
+        read_identified(tmp_path)
+        return
+    with pytest.raises(BadInput, match=rf"{FILE}: .*{says}.* Delete ") as raised:
+        read_identified(tmp_path)
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 600
 
 
 @pytest.mark.parametrize(
@@ -251,7 +273,7 @@ def test_scenes_without_friction_are_refused_and_nothing_stays(store, tmp_path):
 
 
 def test_what_is_not_identified_is_the_scenes():
-    engine = engine_of_beliefs(beliefs_of({"pusher_friction": 0.3}))
+    engine = to_engine({"pusher_friction": 0.3}).simulator.build()
     scene = with_values(samples_scene(), {})[0]
     believed = engine.assume(scene)
     np.testing.assert_allclose(believed.pusher_friction, 0.3)

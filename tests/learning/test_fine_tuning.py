@@ -1,6 +1,5 @@
 """Going on from a trained network: on few pushes, known at their ends alone."""
 
-import shutil
 from dataclasses import replace
 
 import jax
@@ -8,10 +7,9 @@ import numpy as np
 import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
+from models.samples import identified_folder
 from sainet.datasets.batch import to_batch, to_controls, to_initial
-from sainet.engines.identified import beliefs_of, engine_of_beliefs
 from sainet.learning import fit as fit_module
-from sainet.learning.assumed import find_assumed_engine
 from sainet.learning.batch import path_to_frame, predict_batch
 from sainet.learning.best import Best
 from sainet.learning.config import FINE_TUNING, FitConfig
@@ -24,12 +22,11 @@ from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import predict
 from sainet.models.frame import push_frame
 from sainet.models.integrators import RelaxingResidual
-from sainet.models.registry import load_dynamics
-from sainet.runs.documents import write_json
+from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.scenes.state import pack_motion
 
-PLANAR = find_assumed_engine("planar")
+PLANAR = find_internal_engine("planar")
 BEFORE = FitConfig(iterations=3, batch_size=4, steps=12, log_every=1)
 TUNING = replace(
     FINE_TUNING,
@@ -67,8 +64,8 @@ def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
     fit("sain", store, TUNING, out, start_from=str(start / "sain"))
     card, before = read_card(out), read_card(start / "sain")
     assert card.started_from == before.weights
-    assert (before.data_seeds, card.data_seeds) == ([0], [0])
-    assert (card.truth_engine, card.features) == ("recorded", "paper")
+    assert (before.data_seeds, card.data_seeds) == ((0,), (0,))
+    assert (card.truth_engine, card.identity.features) == ("recorded", "paper")
     task = Task("sain", store, TUNING, PLANAR, load(start / "sain"))
     first = begin(task)[0].network
     for found, known in zip(
@@ -91,7 +88,7 @@ def test_a_network_learns_to_see_the_place(store, start, tmp_path):
     seeing = replace(TUNING, features="place", validation_share=0.0)
     fit("in", store, seeing, out, start_from=str(start / "in"))
     network, card = load_network(out)
-    assert card.features == "place"
+    assert card.identity.features == "place"
     assert network.features.has_place
     known = load_network(start / "in")[0].features.body_size
     assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
@@ -211,29 +208,25 @@ def test_repeats_are_validated_on_together_or_not_at_all(tmp_path):
 def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     """Its prediction is computed: the store has none, and the card says it all."""
     values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5, "camera_x_mm": 1.5}
-    write_json(tmp_path / "engine" / "identified.json", {"values": values})
+    internal = identified_folder(tmp_path / "engine", **values)
     words = {"assumed_engine": str(tmp_path / "engine")}
     out = tmp_path / "out"
     fit("sain", store, TUNING, out, start_from=str(start / "sain"), **words)
     card = read_card(out)
-    assert card.inner_engine == "identified"
-    assert card.assumed == beliefs_of(values)
-    model = load_dynamics(str(out)).dynamics
-    assert model.offset == (1.5e-3, 0.0)
-    assert model.dynamics.engine == engine_of_beliefs(card.assumed)
+    assert card.internal == internal
+    model = load_model(str(out)).dynamics
+    assert model.offset.vector == (1.5e-3, 0.0)
+    assert model.dynamics.engine.assumptions == internal.simulator.assumptions
     fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
-    lost = shutil.copytree(out, tmp_path / "lost")
-    write_json(lost / "card.json", card.to_dict() | {"assumed": None})
-    with pytest.raises(BadCheckpoint, match="assumed is missing"):
-        load_dynamics(str(lost))
-    with pytest.raises(BadCheckpoint, match="inner_engine is 'identified'"):
+    with pytest.raises(BadCheckpoint, match="internal engine is 'planar-"):
         fit("sain", store, TUNING, tmp_path / "no", start_from=str(out))
-    task = Task("sain", store, TUNING, find_assumed_engine(str(tmp_path / "engine")))
+    task = Task("sain", store, TUNING, find_internal_engine(str(tmp_path / "engine")))
     arrays = store.read(slice(0, 4), task.names)
     assert "simulated_planar" not in arrays
     batch = task.to_batch(arrays, 12)
-    engine = engine_of_beliefs(card.assumed)
-    wanted = engine.rollout(batch.scene, batch.initial, batch.controls)
+    wanted = internal.simulator.build().rollout(
+        batch.scene, batch.initial, batch.controls
+    )
     np.testing.assert_allclose(
         batch.simulated, pack_motion(wanted.states), rtol=1e-4, atol=1e-6
     )
@@ -262,7 +255,7 @@ def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):
 
 def test_what_cannot_be_gone_on_from_is_refused(store, start, tmp_path):
     out = tmp_path / "out"
-    with pytest.raises(BadCheckpoint, match="model is 'in', this training's is 'sain'"):
+    with pytest.raises(BadCheckpoint, match="kind is 'in', this training's is 'sain'"):
         fit("sain", store, TUNING, out, start_from=str(start / "in"))
     for name in ("nowhere", "physics"):
         says = f"--start-from is '{name}'; it must be engine, in, sain, .*folder"
@@ -272,7 +265,7 @@ def test_what_cannot_be_gone_on_from_is_refused(store, start, tmp_path):
 
 
 def test_a_network_around_another_engine_is_refused(store, tmp_path):
-    with pytest.raises(BadCheckpoint, match="inner_engine is 'bullet'"):
+    with pytest.raises(BadCheckpoint, match="internal engine is 'bullet'"):
         fit("sain", store, TUNING, tmp_path / "out", start_from="sain-bullet")
 
 

@@ -21,7 +21,6 @@ from learning.stores import (
 from sainet.datasets.batch import to_batch
 from sainet.datasets.schema import simulated_name
 from sainet.learning import fit as fit_module
-from sainet.learning.assumed import find_assumed_engine
 from sainet.learning.batch import predict_batch
 from sainet.learning.config import FitConfig
 from sainet.learning.fit import STATE, fit
@@ -30,14 +29,14 @@ from sainet.learning.task import Task, begin
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented, predict
-from sainet.models.registry import load_dynamics
+from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, Diverged, RunConflict
 from sainet.runs.interrupts import remembered_interrupts
 from sainet.runs.manifest import MANIFEST
 from sainet.scenes.state import pack_motion
 
-PLANAR = find_assumed_engine("planar")
+PLANAR = find_internal_engine("planar")
 CONFIG = FitConfig(
     iterations=60,
     batch_size=8,
@@ -86,7 +85,7 @@ def test_a_run_leaves_its_network_its_card_and_its_log(trained, store):
     assert card.manifest["devices"] == jax.device_count()
     assert read_log(trained.folder) == trained.history
     assert [line["iteration"] for line in trained.history] == list(range(5, 61, 5))
-    assert load_dynamics(str(trained.folder)).card == card
+    assert load_model(str(trained.folder)).card == card
 
 
 def test_a_finished_run_is_left_alone(trained, store):
@@ -128,7 +127,7 @@ def test_a_folder_of_somebody_else_is_not_used(store, tmp_path):
 
 
 def test_the_stored_prediction_is_what_the_engine_says_at_prediction(trained, store):
-    made = load_dynamics(str(trained.folder)).dynamics
+    made = load_model(str(trained.folder)).dynamics
     assert isinstance(made, SimulatorAugmented)
     arrays = store.read(slice(0, 6))
     batch = to_batch(arrays, store.info, simulated="planar")
@@ -236,7 +235,7 @@ def test_a_loss_that_is_no_number_stops_the_training(store, tmp_path, monkeypatc
 
 
 def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
-    says = "assumed_engines has no 'bullet'; give --assumed-engine planar, which it has"
+    says = "assumed_engines has no 'bullet'; use planar, which it has"
     with pytest.raises(BadStore, match=says):
         fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
     assert not (tmp_path / "out").exists()

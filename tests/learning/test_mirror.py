@@ -10,10 +10,10 @@ import pytest
 from learning.stores import info_of, made_up, quiet_store, single, write
 from sainet.datasets.batch import to_batch
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.learning.assumed import find_assumed_engine
 from sainet.learning.config import FitConfig
 from sainet.learning.mirror import mirror, mirror_some
 from sainet.learning.task import Task
+from sainet.models.library import find_internal_engine
 from sainet.scenes.state import pack_motion
 
 SOME = jnp.arange(6) % 2 == 0
@@ -75,7 +75,7 @@ def test_the_iteration_decides_and_half_are_mirrored(tmp_path):
     store = write(tmp_path / "data", info, made_up(info))
     arrays = store.read(slice(None))
     config = FitConfig(mirror=True)
-    task = Task("in", store, config, find_assumed_engine("planar"))
+    task = Task("in", store, config, find_internal_engine("planar"))
 
     def mirrored(task, iteration):
         seen = task.to_training_batch(arrays, 12, iteration)

@@ -1,7 +1,5 @@
 """The non-recurrent form: cut into single steps, trained, and started again."""
 
-from dataclasses import replace
-
 import jax
 import numpy as np
 import pytest
@@ -12,12 +10,11 @@ from models.samples import Glide, network, pushes
 from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.learning.assumed import find_assumed_engine
 from sainet.learning.batch import predict_batch
 from sainet.learning.config import FitConfig
 from sainet.learning.fit import fit
 from sainet.learning.single_steps import to_single_steps
-from sainet.learning.task import Task, begin, check_data, settings
+from sainet.learning.task import Task, begin, check_data
 from sainet.models.card import read_card
 from sainet.models.dynamics import (
     LearnedDynamics,
@@ -26,12 +23,12 @@ from sainet.models.dynamics import (
     predict,
 )
 from sainet.models.frame import motion_to_frame, push_frame
-from sainet.models.registry import load_dynamics
+from sainet.models.library import find_internal_engine, load_model
 from sainet.models.restarted import Restarted
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.state import pack_motion
 
-PLANAR = find_assumed_engine("planar")
+PLANAR = find_internal_engine("planar")
 CONFIG = FitConfig(
     iterations=60, batch_size=8, log_every=5, learning_rate=3e-3, recurrent=False
 )
@@ -122,15 +119,9 @@ def test_a_trained_network_says_that_it_is_of_single_steps(trained):
     found = np.array([line["loss"] for line in trained.history])
     assert found[-2:].mean() < 0.8 * found[0]
     assert not read_card(trained.folder).recurrent
-    model = load_dynamics(str(trained.folder)).dynamics
+    model = load_model(str(trained.folder)).dynamics
     assert isinstance(model, Restarted)
     assert isinstance(model.model, SimulatorAugmented)
-
-
-def test_folders_from_before_this_setting_still_resume(store):
-    plain = replace(CONFIG, recurrent=True)
-    assert "recurrent" not in settings(Task("in", store, plain, PLANAR))
-    assert settings(Task("in", store, CONFIG, PLANAR))["recurrent"] is False
 
 
 def test_what_cannot_be_cut_is_refused(store, tmp_path):
@@ -159,7 +150,7 @@ def test_bullet_cannot_restart_in_a_training(around_bullet, tmp_path):
 
 
 def test_a_network_alone_needs_no_engine_that_restarts(around_bullet):
-    bullet = find_assumed_engine("bullet")
+    bullet = find_internal_engine("bullet")
     task = Task("in", around_bullet, CONFIG, bullet)
     check_data(task)
     state, _ = begin(task)
@@ -168,4 +159,4 @@ def test_a_network_alone_needs_no_engine_that_restarts(around_bullet):
 
 def test_a_network_of_single_steps_is_not_put_around_bullet(trained):
     with pytest.raises(BadCheckpoint, match="recurrent is false.*`engine` planar"):
-        load_dynamics(str(trained.folder), engine="bullet", force=True)
+        load_model(str(trained.folder), engine="bullet", force=True)

@@ -1,16 +1,20 @@
 """Networks and pushes that the tests of models, training and contracts share."""
 
 from functools import lru_cache
+from pathlib import Path
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from msgspec import structs
 
 from contracts.worlds import engine, pushed
 from sainet.datasets.config import GenerateConfig
-from sainet.engines.assumed import PAPER_MASS, PAPER_RADIUS, AssumedProperties
+from sainet.engines.assumed import AssumedProperties
 from sainet.engines.base import AbstractEngine
+from sainet.engines.simulator import PAPER, InternalEngine
+from sainet.identification.parameters import to_engine
 from sainet.models.correctors.interaction import InteractionNetwork, Scales
 from sainet.models.dynamics import (
     AbstractDynamics,
@@ -19,7 +23,9 @@ from sainet.models.dynamics import (
     SimulatorAugmented,
 )
 from sainet.models.features import feature_set
+from sainet.models.identified import FILE, Identified
 from sainet.models.integrators import Acceleration, RelaxingResidual
+from sainet.runs.documents import write_document
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, Trajectory
@@ -103,13 +109,14 @@ def assumed(order: list[int]) -> AssumedProperties:
     """The planar engine with the paper's properties, disks in another order."""
     mass, radius = (
         (*values, *[sum(values) / 2] * len(order))
-        for values in (PAPER_MASS, PAPER_RADIUS)
+        for values in (PAPER.mass, PAPER.radius)
     )
-    return AssumedProperties(
-        engine("planar"),
+    assumptions = structs.replace(
+        PAPER,
         mass=tuple(mass[i] for i in order),
         radius=tuple(radius[i] for i in order),
     )
+    return AssumedProperties(engine("planar"), assumptions)
 
 
 def dynamics(model: str, kind: str, order: list[int]) -> AbstractDynamics:
@@ -126,3 +133,12 @@ def quick_dynamics(model: str, kind: str) -> LearnedDynamics | SimulatorAugmente
     if model == "in":
         return LearnedDynamics(network("in", kind))
     return SimulatorAugmented(network("sain", kind), Glide())
+
+
+def identified_folder(folder: Path, **values: float) -> InternalEngine:
+    """Writes identified parameters into a folder; returns the engine with them."""
+    engine = to_engine(values)
+    errors = dict.fromkeys(("before_mm", "after_mm", "before_deg", "after_deg"), 1.0)
+    found = Identified(engine=engine, estimates=(), pushes=1, **errors)
+    write_document(folder / FILE, found)
+    return engine

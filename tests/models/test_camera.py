@@ -12,11 +12,12 @@ from sainet.engines.assumed import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.models.camera import OffsetCamera, with_camera
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.scenes.camera import CameraOffset
 from sainet.scenes.controls import PathControls
 from sainet.scenes.state import pack_motion
 
 STEPS = 40
-OFFSET = (2e-3, -1e-3)
+OFFSET = CameraOffset(x=2e-3, y=-1e-3)
 
 
 def model_of(name, setup):
@@ -36,7 +37,7 @@ def test_all_is_as_if_the_disks_were_where_the_robot_has_them(name, setup):
     scene, initial, controls = world(setup)
     plain = predict(model, scene, initial, controls)
     # What the camera tells of it: the disks elsewhere, the pusher where it was.
-    offset = jnp.array(OFFSET)
+    offset = jnp.array(OFFSET.vector)
     told = eqx.tree_at(
         lambda s: s.position, initial, initial.position + offset[None, None]
     )
@@ -69,8 +70,7 @@ def test_two_advances_are_one_long_one():
 
 
 def test_a_camera_that_agrees_is_no_wrapper():
-    model = PhysicsDynamics(PlanarEngine())
-    for agreed in ({}, {"camera_x_mm": None, "camera_y_mm": 0.0}):
-        assert with_camera(model, agreed) is model
-    found = with_camera(model, {"camera_x_mm": 1.5, "camera_y_mm": None})
-    assert found == OffsetCamera(model, (1.5e-3, 0.0))
+    model = model_of("in", "robot")
+    assert with_camera(model, CameraOffset()) is model
+    found = with_camera(model, CameraOffset(x=1.5e-3))
+    assert found.offset.vector == (1.5e-3, 0.0)

@@ -8,36 +8,35 @@ import numpy as np
 import pytest
 
 from models.samples import network
-from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
+from sainet.engines.simulator import PAPER, PlanarSpec
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import LearnedDynamics, PhysicsDynamics, SimulatorAugmented
-from sainet.models.registry import PHYSICS, load_dynamics
-from sainet.runs.documents import content_hash, write_json
+from sainet.models.identity import ModelId
+from sainet.models.library import PHYSICS, load_model
+from sainet.runs.documents import content_hash, write_document, write_json
 from sainet.runs.errors import BadCheckpoint, UnknownName
 from sainet.scenes.scene import TIME_STEP
-
-ASSUMED = {"mass": PAPER_MASS, "radius": PAPER_RADIUS, "friction": PAPER_FRICTION}
 
 
 def write_network(folder, model="sain", kind="robot", seed=0):
     """A trained network's folder, as the training leaves it."""
     data = save_arrays(folder / WEIGHTS, network(model, kind, seed))
     card = Card(
-        model=model,
+        identity=ModelId(
+            kind=model, simulator=PlanarSpec() if model == "sain" else None
+        ),
         kind=kind,
         time_step=TIME_STEP,
-        inner_engine="planar" if model == "sain" else None,
         truth_engine="planar",
-        assumed=ASSUMED if model == "sain" else None,
         data="0" * 64,
-        data_seed=0,
+        data_seeds=(0,),
         weights=content_hash(data),
         config={},
         manifest={},
     )
-    write_json(folder / CARD, card.to_dict())
+    write_document(folder / CARD, card)
     return folder
 
 
@@ -49,6 +48,18 @@ def folder(tmp_path):
 def edit_card(folder, **changes):
     card = json.loads((folder / CARD).read_text())
     write_json(folder / CARD, card | changes)
+
+
+def edit_simulator(folder, **changes):
+    identity = json.loads((folder / CARD).read_text())["identity"]
+    simulator = identity["simulator"] | changes
+    edit_card(folder, identity=identity | {"simulator": simulator})
+
+
+def edit_assumptions(folder, **changes):
+    card = json.loads((folder / CARD).read_text())
+    assumed = card["identity"]["simulator"]["assumptions"]
+    edit_simulator(folder, assumptions=assumed | changes)
 
 
 def weights_with(folder, change):
@@ -66,32 +77,32 @@ def test_a_network_comes_back_bit_for_bit(tmp_path, model, kind):
     for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
         assert one.dtype == other.dtype
         assert np.asarray(one).tobytes() == np.asarray(other).tobytes()
-    assert (card.model, card.kind, card.time_step) == (model, kind, TIME_STEP)
+    assert (card.identity.kind, card.kind, card.time_step) == (model, kind, TIME_STEP)
 
 
 def test_the_registry_wraps_what_the_card_says(tmp_path):
-    sain = load_dynamics(str(write_network(tmp_path / "a", "sain"))).dynamics
+    sain = load_model(str(write_network(tmp_path / "a", "sain"))).dynamics
     assert isinstance(sain, SimulatorAugmented)
-    assert (sain.engine.mass, sain.engine.radius) == (PAPER_MASS, PAPER_RADIUS)
-    plain = load_dynamics(str(write_network(tmp_path / "b", "in")))
+    assert sain.engine.assumptions == PAPER
+    plain = load_model(str(write_network(tmp_path / "b", "in")))
     assert isinstance(plain.dynamics, LearnedDynamics)
     assert plain.name == "b"
 
 
-def test_calibrated_physics_knows_the_disks_but_not_the_friction():
-    found = {name: load_dynamics(name).dynamics for name in PHYSICS}
+def test_true_property_physics_assumes_the_table_friction_only():
+    found = {name: load_model(name).dynamics for name in PHYSICS}
     assert all(isinstance(d, PhysicsDynamics) for d in found.values())
-    assert found["physics"].engine.mass == PAPER_MASS
-    calibrated = found["physics-calibrated"].engine
-    assert (calibrated.mass, calibrated.radius) == (None, None)
-    assert calibrated.friction == PAPER_FRICTION
+    assert found["physics"].engine.assumptions == PAPER
+    true = found["physics-true"].engine.assumptions
+    assert (true.mass, true.radius) == (None, None)
+    assert true.table_friction == PAPER.table_friction
 
 
 def test_an_unknown_name_lists_what_there_is(tmp_path):
-    with pytest.raises(UnknownName, match=r"'nothing'.*physics-calibrated.*folder"):
-        load_dynamics("nothing")
-    with pytest.raises(BadCheckpoint, match=r"card\.json: missing"):
-        load_dynamics(str(tmp_path))
+    with pytest.raises(UnknownName, match=r"'nothing'.*physics-true.*folder"):
+        load_model("nothing")
+    with pytest.raises(BadCheckpoint, match=r"card\.json: not found"):
+        load_model(str(tmp_path))
 
 
 @pytest.mark.parametrize("name", [CARD, WEIGHTS])
@@ -107,35 +118,19 @@ def test_a_harmed_file_is_named(folder, name, harm):
         kept = {"empty": b"", "truncated": whole[: len(whole) // 2]}
         path.write_bytes(kept.get(harm, rng.bytes(500)))
     with pytest.raises(BadCheckpoint, match=name) as raised:
-        load_dynamics(str(folder))
+        load_model(str(folder))
     assert "\n" not in str(raised.value)
 
 
 BAD_FIELDS = {
-    "format_version": [2, "1", None, 1.5],
-    "model": ["mlp", None, ["in"], "in"],
+    "format_version": [1, 3, "2", None, 1.5],
     "kind": ["lab", None, ["robot"], "direct-force"],
     "time_step": ["0.004", None, 0, 1, 0.0, -0.1, 2.0, True, [0.004]],
-    "inner_engine": ["havok", None, ["planar"], {}],
     "weights": ["0" * 64, None],
-    "features": ["place", "everything", None],
     "started_from": [3],
-    "earlier_seeds": [3, None, ["0"], [0.5], [True]],
+    "data_seeds": [3, None, ["0"], [0.5], [True]],
     "residual": ["yes", None, 1],
     "config": [None, []],
-    "assumed": [
-        [1, 2],
-        "paper",
-        *(
-            {"mass": bad}
-            for bad in ("heavy", [], [0.9, "x"], [0, 1], [-1.0], 1.0, True)
-        ),
-        *({"mass": bad} for bad in ([True, 1], [float("1e999")], [[1.0]])),
-        *({"radius": bad} for bad in ("wide", [], ["x"], [0.05, 0], [-0.05], {})),
-        *({"friction": bad} for bad in ("ice", -0.1, [0.1], True, float("1e999"))),
-        *({"pressure_radius_ratio": bad} for bad in (0, "even", True, 10**400)),
-        *({"camera_x_mm": bad} for bad in ("left", True, [1.0], float("1e999"))),
-    ],
 }
 
 
@@ -152,33 +147,95 @@ def test_a_card_with_a_bad_field_names_it(folder, name, value):
     (folder / CARD).write_text(
         json.dumps(card)
     )  # infinity too, which ours never writes
-    # A card of the other network: it is the weights that then do not fit.
-    fits_not = value in ("in", "direct-force", "place")
+    # A card of the other setup: it is the weights that then do not fit.
+    fits_not = value == "direct-force"
     wanted = WEIGHTS if fits_not else f"{CARD}.*{name}"
     with pytest.raises(BadCheckpoint, match=wanted) as raised:
-        load_dynamics(str(folder))
+        load_model(str(folder))
     assert "\n" not in str(raised.value)
 
 
-@pytest.mark.parametrize("name", ["model", "kind", "time_step", "weights", "assumed"])
+BAD_ASSUMPTIONS = {
+    "mass": ["heavy", [0.9, "x"], [0, 1], [-1.0], 1.0, True, [True, 1], [[1.0]]],
+    "radius": ["wide", ["x"], [0.05, 0], [-0.05], {}, [100.0], [1e-46]],
+    "table_friction": ["ice", -0.1, [0.1], True, 1e30],
+    "pusher_friction": [-1, 10**400],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        pytest.param(name, value, id=f"{name}={str(value)[:20]}")
+        for name, values in BAD_ASSUMPTIONS.items()
+        for value in values
+    ],
+)
+def test_assumptions_out_of_bounds_are_refused_with_their_field(folder, name, value):
+    edit_assumptions(folder, **{name: value})
+    with pytest.raises(BadCheckpoint, match=rf"{CARD}: .*{name}") as raised:
+        load_model(str(folder))
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 500
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"pressure_radius_ratio": 50},
+        {"pressure_radius_ratio": "even"},
+        {"engine": "havok"},
+        {"engine": None},
+        {"version": "new"},
+    ],
+)
+def test_a_simulator_that_cannot_be_is_refused(folder, changes):
+    edit_simulator(folder, **changes)
+    with pytest.raises(BadCheckpoint, match=rf"{CARD}: .*simulator"):
+        load_model(str(folder))
+
+
+@pytest.mark.parametrize("offset", [{"x": "left"}, {"x": True}, {"y": 5.0}, [1.0]])
+def test_a_camera_that_cannot_be_is_refused(folder, offset):
+    edit_card(folder, camera=offset)
+    with pytest.raises(BadCheckpoint, match=rf"{CARD}: .*camera"):
+        load_model(str(folder))
+
+
+@pytest.mark.parametrize("name", ["identity", "kind", "time_step", "weights", "data"])
 def test_a_card_that_lacks_a_field_names_it(folder, name):
     card = json.loads((folder / CARD).read_text())
     del card[name]
     write_json(folder / CARD, card)
-    with pytest.raises(BadCheckpoint, match=rf"{CARD}: {name} is missing"):
+    with pytest.raises(BadCheckpoint, match=rf"{CARD}: .*`{name}`"):
         read_card(folder)
 
 
-def test_a_network_that_adds_to_an_engine_has_one(folder):
-    edit_card(folder, model="in", residual=True)
-    with pytest.raises(BadCheckpoint, match="model is 'in'; it must be 'sain' where"):
+@pytest.mark.parametrize(
+    ("identity", "says"),
+    [
+        ({"kind": "physics"}, "identity.kind is 'physics'"),
+        ({"kind": "sain"}, "identity.simulator is missing"),
+        ({"kind": "in", "simulator": {"engine": "planar"}}, "there is one for 'in'"),
+    ],
+)
+def test_a_network_that_cannot_be_is_refused(folder, identity, says):
+    edit_card(folder, identity=identity)
+    with pytest.raises(BadCheckpoint, match=says):
         read_card(folder)
 
 
-def test_properties_that_are_not_assumed_are_the_true_ones(folder):
-    edit_card(folder, assumed={"mass": None, "radius": [0.05], "friction": 0.0})
-    engine = load_dynamics(str(folder)).dynamics.engine
-    assert (engine.mass, engine.radius, engine.friction) == (None, (0.05,), 0.0)
+def test_an_additive_network_needs_an_internal_engine(folder):
+    edit_card(folder, identity={"kind": "in"}, residual=True)
+    with pytest.raises(BadCheckpoint, match="residual is true"):
+        read_card(folder)
+
+
+def test_properties_that_are_not_assumed_stay_the_scenes(folder):
+    edit_assumptions(folder, mass=None, radius=[0.05], table_friction=0.0)
+    assumed = load_model(str(folder)).dynamics.engine.assumptions
+    assert (assumed.mass, assumed.radius) == (None, (0.05,))
+    assert assumed.table_friction == 0.0
 
 
 def harmed(change):
@@ -210,15 +267,14 @@ def test_other_weights_than_the_cards_are_refused(folder):
 
 
 def test_a_network_is_for_its_pushes_alone(folder):
-    model = load_dynamics(str(folder))
+    model = load_model(str(folder))
     model.check_fits("robot", TIME_STEP)
-    with pytest.raises(
-        BadCheckpoint, match=r"kind is 'robot'.*'direct-force'.*`force`"
-    ):
+    says = r"kind is 'robot'.*'direct-force'.*`force`"
+    with pytest.raises(BadCheckpoint, match=says):
         model.check_fits("direct-force", TIME_STEP)
     with pytest.raises(BadCheckpoint, match=r"time_step is .*data's is 0\.01 s"):
         model.check_fits("robot", 0.01)
-    load_dynamics("physics").check_fits("direct-force", 0.01)
+    load_model("physics").check_fits("direct-force", 0.01)
 
 
 def test_trees_keep_integers_and_flags(tmp_path):

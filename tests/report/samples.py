@@ -11,7 +11,7 @@ PUSHER_RADIUS = 0.0048  # m
 # By how much each model ends off (mm and degrees), and along which way (rad).
 _OFF = {
     "physics": (3.8, 0.9, 0.6),
-    "physics-calibrated": (0.95, 0.5, -0.8),
+    "physics-true": (0.95, 0.5, -0.8),
     "in": (0.8, 0.7, 2.0),
     "sain": (0.35, 0.25, 2.6),
 }
@@ -94,7 +94,7 @@ def row(model, body, scale, group=None):
 
 def result():
     """Return what ``sainet evaluate --json`` prints, for four models."""
-    scales = {"physics": 1.0, "physics-calibrated": 0.23, "in": 0.21, "sain": 0.165}
+    scales = {"physics": 1.0, "physics-true": 0.23, "in": 0.21, "sain": 0.165}
     rows = [
         row(model, body, scale * (1.0, 0.9)[body - 1])
         for model, scale in scales.items()

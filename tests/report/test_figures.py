@@ -128,7 +128,7 @@ def test_a_network_of_another_form_is_called_after_the_one_that_is_known():
 
 
 def test_lines_are_told_apart_without_their_colours():
-    others = ("physics-calibrated", "in", "sain-bullet", "sain-calibrated")
+    others = ("physics-true", "in", "sain-bullet", "sain-true")
     styles = styles_of([*others, *(f"runs/{number}" for number in range(6))])
     dashes = {style.dash for style in styles.values()}
     assert len(dashes) == len(styles) == 10

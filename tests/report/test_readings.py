@@ -35,7 +35,7 @@ def pair(
 
 
 def test_errors_stand_in_relation_to_physics_and_to_what_a_model_is_compared_with():
-    calibrated = "physics-calibrated"
+    calibrated = "physics-true"
     told = READINGS["of_errors"](
         {
             "rows": errors("physics", (4.0, 2.0), (1.0, 0.5))
@@ -56,11 +56,11 @@ def test_errors_stand_in_relation_to_physics_and_to_what_a_model_is_compared_wit
             ],
         }
     )
-    assert "| Physics, calibrated | 0.50 / 0.25 | 1.00 / 1.00 |" in told
+    assert "| Physics, true properties | 0.50 / 0.25 | 1.00 / 1.00 |" in told
     assert "| SAIN | 0.20 / 0.30 | 0.20 / 0.40 |" in told
     assert "| *SAIN, published* | 0.90 / 0.60 | 0.50 / 0.20 |" in told
     against = (
-        "Against Physics, calibrated, SAIN around Bullet is worse in rot of disk 2"
+        "Against Physics, true properties, SAIN around Bullet is worse in rot of disk 2"
     )
     assert f"{against}; SAIN is better in pos of disk 1 and worse in pos of d" in told
     assert "in Bullet leave 0.50 / 0.25, learning around Bullet with wrong ones" in told

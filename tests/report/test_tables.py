@@ -123,14 +123,14 @@ def test_physics_is_compared_with_where_nothing_better_informed_is():
     told = [
         {"model": "sain", "against": against, "group": None, "body": 1}
         | {"metric": "pos_mm", "difference": -1.0, "interval": None}
-        for against in ("physics", "physics-calibrated", "in")
+        for against in ("physics", "physics-true", "in")
     ]
     rows = {name: samples.row(name, 1, 0.5) for name in ("physics", "in", "sain")}
     without = printed({"rows": [*rows.values()], "comparisons": [told[0], told[2]]})
     assert "SAIN minus Physics: pos" in without
-    rows["physics-calibrated"] = samples.row("physics-calibrated", 1, 0.5)
+    rows["physics-true"] = samples.row("physics-true", 1, 0.5)
     beside = printed({"rows": [*rows.values()], "comparisons": told})
-    assert "SAIN minus Physics, calibrated: pos" in beside
+    assert "SAIN minus Physics, true properties: pos" in beside
     assert "SAIN minus Physics: pos" not in beside
 
 

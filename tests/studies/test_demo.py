@@ -34,7 +34,7 @@ def demo(tmp_path_factory):
 def test_the_demo_compares_four_models_on_both_disks(demo):
     out, result = demo
     rows = {(row["model"], row["body"]) for row in result["rows"]}
-    models = ("physics", "physics-calibrated", "in", "sain")
+    models = ("physics", "physics-true", "in", "sain")
     assert rows == {(model, body) for model in models for body in (1, 2)}
     assert all(row["n"] == 6 for row in result["rows"])
     told = "100 pushes for 2 iterations of the paper's 10,000"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sainet.datasets.store import open_store
+from sainet.models.card import read_card
 from sainet.runs.documents import read_json
 from sainet.studies.data_efficiency import IN_FULL, again
 from sainet.studies.paper_setup import AROUND, BYSTANDER, NETWORKS
@@ -15,7 +16,7 @@ from sainet.studies.robustness import push_angles
 from support import require
 
 pytestmark = pytest.mark.slow
-PHYSICS = {"physics", "physics-calibrated"}
+PHYSICS = {"physics", "physics-true"}
 
 
 @pytest.fixture(autouse=True)
@@ -54,7 +55,7 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
         for name in ("sain", *beside)
     )
     assert new["started_from"] == old["weights"]
-    assert new["inner_engine"] == old["inner_engine"]
+    assert new["identity"] == old["identity"]
     assert three["published"] == published_rows(DIRECT_FORCE_THREE_DISKS)
     kept = read_json(tmp_path / "direct-force-three-disks" / "table.json")
     assert kept["rows"] == three["rows"]
@@ -63,10 +64,10 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
     versions = read_json(tmp_path / "direct-force-three-disks" / "manifest.json")
     assert versions["versions"]["jax"]
     engines = {
-        read_json(path)["model"] + " " + str(read_json(path)["inner_engine"])
-        for path in made
+        internal.simulator.slug if internal else None
+        for internal in (read_card(path.parent).internal for path in made)
     }
-    assert engines == {"in None", *(f"sain {engine}" for engine in AROUND.values())}
+    assert engines == {None, *AROUND.values()}
 
 
 def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):

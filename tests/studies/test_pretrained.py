@@ -8,20 +8,20 @@ import pytest
 
 from sainet.learning.config import FitConfig
 from sainet.models.card import CARD
-from sainet.models.registry import (
+from sainet.models.library import (
     OF_PAPER,
     OF_STROKES,
     PRETRAINED,
     SHIPPED,
-    load_dynamics,
+    load_model,
 )
 from sainet.runs.documents import read_json
 from sainet.studies.paper_setup import paper_setup
 from sainet.studies.strokes import stroke_setup
 from support import REPOSITORY, require
 
-SAME = ("model", "kind", "time_step", "inner_engine", "truth_engine", "assumed")
-SAME += ("data_seed", "earlier_seeds", "features", "recurrent", "format_version")
+SAME = ("identity", "kind", "time_step", "truth_engine", "camera", "data_seeds")
+SAME += ("recurrent", "residual", "format_version")
 SMALLER = ("iterations", "batch_size")
 
 
@@ -49,6 +49,4 @@ def test_small_ones_have_the_cards_of_the_shipped_ones(tiny, chain, tmp_path):
         ]
         assert recipes[0] == recipes[1]
         assert shipped["config"]["iterations"] == iterations[name]
-        load_dynamics(str(tmp_path / "into" / name)).check_fits(
-            "robot", 1 / 240, seed=1
-        )
+        load_model(str(tmp_path / "into" / name)).check_fits("robot", 1 / 240, seed=1)

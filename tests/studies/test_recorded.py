@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
-from sainet.engines.identified import FILE
+from models.samples import identified_folder
 from sainet.models.card import read_card
-from sainet.runs.documents import read_json, write_json
+from sainet.runs.documents import read_json
 from sainet.runs.errors import BadInput
 from sainet.studies import (
     few_pushes,
@@ -50,8 +50,7 @@ def recorded(tmp_path):
 def identify(store, folder):
     """Stands in for identification: the first push decides what is found."""
     found = 0.2 + 0.1 * float(store.read(slice(1), ("mass",))["mass"][0, 0])
-    values = {"pusher_friction": found, "camera_x_mm": 1.0}
-    write_json(folder / FILE, {"values": values})
+    identified_folder(folder, pusher_friction=found, camera_x_mm=1.0)
 
 
 @pytest.fixture
@@ -118,9 +117,10 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
     }
     added = cards[f"abs/fold-0/{told}"]
     assert (added.started_from, added.residual) == (None, True)
-    assert (added.inner_engine, added.features) == ("identified", "paper")
+    assert added.internal.simulator.is_identified
+    assert added.identity.features == "paper"
     tuned = [card for name, card in cards.items() if name.endswith("tuned-place")]
-    assert {card.features for card in tuned} == {"place"}
+    assert {card.identity.features for card in tuned} == {"place"}
     assert {card.started_from for card in tuned} == {tuned[0].started_from} != {None}
     assert len({card.data for card in cards.values()}) == 8  # no two saw the same
 

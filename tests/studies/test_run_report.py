@@ -7,7 +7,7 @@ import pytest
 
 from report import samples
 from sainet.control.trials import FOLDER
-from sainet.models.registry import PRETRAINED
+from sainet.models.library import PRETRAINED
 from sainet.report.figures.learning import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
 from sainet.runs.documents import write_json

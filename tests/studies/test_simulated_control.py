@@ -28,9 +28,9 @@ def test_models_push_to_the_same_goals(make, tmp_path, monkeypatch):
     monkeypatch.setattr(
         simulated_control, "groups", lambda trials: [Group("easy, greedy", small)]
     )
-    monkeypatch.setattr(simulated_control, "MODELS", ("physics", "physics-calibrated"))
+    monkeypatch.setattr(simulated_control, "MODELS", ("physics", "physics-true"))
     table = make("simulated-control")
-    assert [row["model"] for row in table["rows"]] == ["physics", "physics-calibrated"]
+    assert [row["model"] for row in table["rows"]] == ["physics", "physics-true"]
     assert [row["trials"] for row in table["rows"]] == [2, 2]
     pairs = {pair["measure"]: pair for pair in table["pairs"]}
     assert tuple(pairs) == ("solved", "within_4_mm", "within_25_pushes")

@@ -17,7 +17,7 @@ from sainet.control.config import ControlConfig
 from sainet.control.trial import Trial, make_trial
 from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
-from sainet.models.registry import load_dynamics
+from sainet.models.library import load_model
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.base import Plan
 from sainet.planning.outcomes import batch_of, roll_pushes
@@ -75,7 +75,7 @@ def bench_planning(
 def decide(model: str, planner: str = "tree") -> Plan:
     """Return the plan of one decision at the start of a hard trial."""
     trial = _trial()
-    dynamics = load_dynamics(model).dynamics
+    dynamics = load_model(model).dynamics
     state = trial.robot.observe()
     return make_planner(planner).plan(dynamics, trial.task, trial.scene, state)
 
@@ -85,7 +85,7 @@ def _trial() -> Trial:
 
 
 def _timed(model: str, planner: str) -> float:
-    trial, dynamics = _trial(), load_dynamics(model).dynamics
+    trial, dynamics = _trial(), load_model(model).dynamics
     state, chosen = trial.robot.observe(), make_planner(planner)
     start = perf_counter()
     chosen.plan(dynamics, trial.task, trial.scene, state)

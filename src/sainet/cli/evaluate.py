@@ -17,7 +17,7 @@ class Evaluate:
     """Measure the errors of several models on the same stored pushes."""
 
     model: tuple[str, ...] = ()
-    """physics, physics-calibrated, shipped networks (in, sain, sain-bullet), or folders
+    """physics, physics-true, shipped networks (in, sain, sain-bullet), or folders
     of trained ones. Default: physics and the shipped networks that fit the data."""
     data: Path
     """Dataset to predict."""
@@ -40,14 +40,14 @@ class Evaluate:
         use_devices(self.devices)
         from sainet.datasets.store import open_store
         from sainet.evaluation.evaluate import evaluate
-        from sainet.models.registry import load_dynamics
+        from sainet.models.library import load_model
         from sainet.report.tables import print_table
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
         names = self.model or self._fitting(store)
         models = [
-            load_dynamics(name, engine=self.engine, force=self.force) for name in names
+            load_model(name, engine=self.engine, force=self.force) for name in names
         ]
         total = store.info.pushes * len(models)
         with progress_bar("Predicting", total, self.output) as advance:
@@ -63,13 +63,13 @@ class Evaluate:
 
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit the data; say why not."""
-        from sainet.models.registry import OF_PAPER, OF_STROKES, PHYSICS, load_dynamics
+        from sainet.models.library import OF_PAPER, OF_STROKES, PHYSICS, load_model
         from sainet.runs.errors import BadCheckpoint, MissingExtra
 
         names, info = list(PHYSICS), store.info
         for name in OF_STROKES if info.bodies == 1 else OF_PAPER:
             try:
-                model = load_dynamics(name, engine=self.engine, force=self.force)
+                model = load_model(name, engine=self.engine, force=self.force)
                 if not self.force:
                     model.check_fits(info.kind, info.time_step, seed=info.seed)
                 names.append(name)

@@ -37,7 +37,7 @@ class Identify:
             )
         print_estimates(found, self.output.console)
         self.output.say(
-            f"Compare: sainet evaluate --model physics-calibrated {self.out} "
+            f"Compare: sainet evaluate --model physics-true {self.out} "
             f"--data {self.data}"
         )
-        return {"out": str(self.out), **found}
+        return {"out": str(self.out), **found.to_json()}

@@ -29,7 +29,7 @@ class ControlConfig:
     """Which model pushes in which world, how often, and to what goals."""
 
     model: str = "sain"
-    """physics, physics-calibrated, a shipped network, or a trained one's folder."""
+    """physics, physics-true, a shipped network, or a trained one's folder."""
     goals: Goals = "easy"
     """easy: within 30 degrees of the disks' axis. hard: 30 to 60 to either side."""
     planner: str = "greedy"

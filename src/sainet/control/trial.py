@@ -8,7 +8,7 @@ import numpy as np
 
 from sainet.control.config import ControlConfig
 from sainet.engines import make_engine
-from sainet.engines.assumed import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
+from sainet.engines.simulator import PAPER
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
@@ -56,8 +56,10 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
     task = PushToGoal(
         jnp.asarray(goal, jnp.float32), moved, config.tolerance, config.alignment
     )
-    told = (PAPER_MASS, PAPER_RADIUS) if config.knows == "nominal" else (MASS, RADIUS)
-    return Trial(robot, task, _scene(*told, config.disks, PAPER_FRICTION))
+    mass, radius, friction = PAPER.mass, PAPER.radius, PAPER.table_friction
+    assert mass and radius and friction  # all are assumed
+    given = (mass, radius) if config.knows == "nominal" else (MASS, RADIUS)
+    return Trial(robot, task, _scene(*given, config.disks, friction))
 
 
 def _scene(

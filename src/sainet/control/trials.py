@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,20 +13,17 @@ from sainet.control.episode import Episode, run_episode
 from sainet.control.record import read_record, record
 from sainet.control.trial import make_trial
 from sainet.engines import make_engine
-from sainet.engines.identified import FILE
-from sainet.models.named import NamedDynamics
-from sainet.models.registry import load_dynamics
+from sainet.models.library import load_model
+from sainet.models.model import Model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
-from sainet.runs.documents import content_hash, write_json
+from sainet.runs.documents import write_json
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
 from sainet.scenes.scene import TIME_STEP
 
 SUMMARY = "episodes.json"
 FOLDER = "episodes"
-# Settings that came later: a folder from before, which lacks them, had these.
-_LATER = {"aim": 1.0}
 
 Told = Callable[[dict[str, Any]], None]
 
@@ -52,10 +48,7 @@ def run_trials(
         BadInput: the model cannot be used for such pushes, or an episode is damaged.
     """
     model, _ = prepare(config)  # what is wrong is said before anything is made
-    settings = {"command": "control", "weights": _weights(model), **asdict(config)}
-    for name, before in _LATER.items():
-        if settings[name] == before:
-            del settings[name]
+    settings = {"command": "control", "weights": model.digest, **asdict(config)}
     folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     files = [episode_file(out, trial) for trial in range(config.trials)]
     known = {index for index, path in enumerate(files) if path.is_file()}
@@ -68,16 +61,6 @@ def run_trials(
     told = {"episodes": [str(path.relative_to(out)) for path in files]}
     write_json(folder.path / SUMMARY, told)
     return records
-
-
-def _weights(model: NamedDynamics) -> str | None:
-    """Return the hash of what was trained or identified, if anything was.
-
-    What was made again in the same folder is another model.
-    """
-    if model.card is None and model.folder is not None:
-        return content_hash((model.folder / FILE).read_bytes())
-    return model.card.weights if model.card else None
 
 
 def episode_file(out: Path, trial: int) -> Path:
@@ -113,14 +96,13 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
     return index
 
 
-@lru_cache(maxsize=1)
-def prepare(config: ControlConfig) -> tuple[NamedDynamics, AbstractPlanner]:
-    """Load what plans, once for a process: nothing compiles twice.
+def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
+    """Load model and planner; loading the same model again compiles nothing.
 
     Raises:
         BadInput: model, planner or world cannot be had, or not for such pushes.
     """
-    model = load_dynamics(config.model)
+    model = load_model(config.model)
     model.check_fits("robot", TIME_STEP)
     planner = make_planner(config.planner, deadline=config.deadline)
     make_engine(config.world)

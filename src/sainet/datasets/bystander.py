@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sainet.datasets.assumed import simulate
 from sainet.datasets.derive import derive
+from sainet.datasets.predictions import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name, variables
 from sainet.datasets.store import Store
+from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import BadStore
 
 TOUCHING = 0.5  # share of the tries that are in touch with another disk
@@ -120,12 +121,12 @@ def _append(array: np.ndarray, values: np.ndarray | None, axis: int) -> np.ndarr
 def _simulate(
     engine: str, arrays: Arrays, info: StoreInfo, on_pushes: Callable[[int], None]
 ) -> np.ndarray:
-    parts = []
+    parts, simulator = [], simulator_named(engine)
     for index in range(info.chunks):
         rows = info.chunk_slice(index)
         names = [f"push {row} of the dataset" for row in range(rows.start, rows.stop)]
         chunk = {name: array[rows] for name, array in arrays.items()}
-        parts.append(simulate(engine, chunk, info, names))
+        parts.append(simulate(simulator, chunk, info, names))
         on_pushes(len(names))
     return np.concatenate(parts)
 

@@ -5,7 +5,8 @@ from typing import Literal, get_args
 
 from tyro.conf import Positional
 
-from sainet.engines import ASSUMED_ENGINES, ENGINES
+from sainet.engines import ENGINES
+from sainet.engines.simulator import SIMULATORS
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import (
     FRICTION,
@@ -69,8 +70,9 @@ class GenerateConfig:
     engine: str = "planar"
     """Engine that makes the truth."""
     assumed_engine: tuple[str, ...] = ("planar",)
-    """Engines that predict s-bar: planar or bullet with the paper's assumed properties,
-    planar-calibrated or bullet-calibrated with the true masses and radii."""
+    """Internal engines whose simulator predictions are stored: planar or bullet with
+    the paper's assumed properties, planar-true or bullet-true with true masses and
+    radii."""
     seed: int = 0
     """Of everything random; the same seed gives the same bytes."""
     mass_kg: Range = (0.85, 1.15)
@@ -115,7 +117,7 @@ class GenerateConfig:
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
         require_one_of("engine", self.engine, ENGINES)
         for name in self.assumed_engine:
-            require_one_of("assumed_engine", name, ASSUMED_ENGINES)
+            require_one_of("assumed_engine", name, SIMULATORS)
         different = len(set(self.assumed_engine)) == len(self.assumed_engine) > 0
         wanted = "one or more different names"
         require(different, "assumed_engine", wanted, self.assumed_engine)

@@ -19,8 +19,9 @@ from sainet.datasets.writer import (
     missing_chunks,
     write_chunk,
 )
-from sainet.engines import make_assumed_engine, make_engine
+from sainet.engines import make_engine
 from sainet.engines.bullet.engine import MOST_DISKS, BulletEngine
+from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import require
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
@@ -75,7 +76,7 @@ def generate(
 def _check_possible(config: GenerateConfig) -> None:
     """Raise before anything is written: an engine may be missing, or room for disks."""
     engines = [make_engine(config.engine)]
-    engines += [make_assumed_engine(name).engine for name in config.assumed_engine]
+    engines += [simulator_named(name).build().engine for name in config.assumed_engine]
     if any(isinstance(engine, BulletEngine) for engine in engines):
         wanted = f"at most {MOST_DISKS} with the engine bullet"
         require(config.disks <= MOST_DISKS, "disks", wanted, config.disks)

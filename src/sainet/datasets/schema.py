@@ -8,6 +8,7 @@ import numpy as np
 Arrays = dict[str, np.ndarray]  # of some pushes, by the names of variables
 
 FORMAT_VERSION = 1
+RECORDED = "recorded"  # in the place of the engine that made the truth
 MOTION = ("x", "y", "angle", "velocity_x", "velocity_y", "spin")
 MOTION_UNITS = "m m rad m/s m/s rad/s"
 
@@ -33,6 +34,11 @@ class StoreInfo:
     seed: int | None = None
     pusher_mass: float = 10.0  # kg (direct force)
     damping: float = 1000.0  # N s/m (direct force)
+
+    @property
+    def is_recorded(self) -> bool:
+        """Whether the pushes were recorded, not simulated."""
+        return self.engine == RECORDED
 
     @property
     def chunks(self) -> int:

@@ -8,8 +8,9 @@ from sainet.datasets.batch import check_finite, from_trajectory
 from sainet.datasets.config import GenerateConfig, bounds
 from sainet.datasets.sampling import Draws, chunk_generator, draw
 from sainet.datasets.schema import StoreInfo, simulated_name
-from sainet.engines import make_assumed_engine, make_engine
+from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine, roll_out
+from sainet.engines.simulator import simulator_named
 from sainet.scenes.controls import (
     Controls,
     ForceControls,
@@ -68,7 +69,7 @@ def simulate_chunk(config: GenerateConfig, index: int) -> dict[str, np.ndarray]:
     truth, pusher = _rollout(make_engine(config.engine), world, initial, actual)
     simulated = {
         simulated_name(name): _rollout(
-            make_assumed_engine(name), scene, initial, controls
+            simulator_named(name).build(), scene, initial, controls
         )[0]
         for name in config.assumed_engine
     }

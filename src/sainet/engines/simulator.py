@@ -7,12 +7,13 @@ JAX until then.
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import msgspec
 
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import unknown_name
+from sainet.scenes.camera import AGREES, CameraOffset
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ class PlanarSpec(_Spec, frozen=True, kw_only=True, tag="planar"):
         from sainet.engines.planar.engine import PlanarEngine
 
         engine = PlanarEngine(pressure_radius_ratio=self.pressure_radius_ratio)
-        return AssumedProperties(engine, **_properties(self.assumptions))
+        return AssumedProperties(engine, self.assumptions)
 
 
 class BulletSpec(_Spec, frozen=True, kw_only=True, tag="bullet"):
@@ -94,10 +95,18 @@ class BulletSpec(_Spec, frozen=True, kw_only=True, tag="bullet"):
         from sainet.engines.assumed import AssumedProperties
         from sainet.engines.bullet.engine import BulletEngine
 
-        return AssumedProperties(BulletEngine(), **_properties(self.assumptions))
+        return AssumedProperties(BulletEngine(), self.assumptions)
 
 
 SimulatorSpec = PlanarSpec | BulletSpec
+
+
+class InternalEngine(msgspec.Struct, frozen=True):
+    """What predicts s-bar for a network: a simulator, and where its camera looks."""
+
+    simulator: SimulatorSpec
+    camera: CameraOffset = AGREES
+
 
 # Specifications by the names that options take and that stored arrays have.
 SIMULATORS: Mapping[str, SimulatorSpec] = MappingProxyType(
@@ -119,8 +128,3 @@ def simulator_named(name: str) -> SimulatorSpec:
     if name not in SIMULATORS:
         raise unknown_name("simulator", name, SIMULATORS)
     return SIMULATORS[name]
-
-
-def _properties(assumptions: Assumptions) -> dict[str, Any]:
-    known = msgspec.structs.asdict(assumptions)
-    return {"friction": known.pop("table_friction"), **known}

@@ -25,7 +25,7 @@ from sainet.evaluation.metrics import (
 )
 from sainet.evaluation.rows import comparison_rows, error_rows
 from sainet.models.dynamics import AbstractDynamics
-from sainet.models.named import NamedDynamics
+from sainet.models.model import Model
 from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200
@@ -107,7 +107,7 @@ def _without_intervals(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def evaluate(
-    models: Sequence[NamedDynamics],
+    models: Sequence[Model],
     store: Store,
     *,
     steps: int | None = None,
@@ -153,7 +153,7 @@ def evaluate(
 
 
 def predict_ends(
-    model: NamedDynamics, store: Store
+    model: Model, store: Store
 ) -> tuple[Float[np.ndarray, "push body 3"], Float[np.ndarray, "push body 3"]]:
     """Return predicted and observed poses (m, rad) at the last observed steps.
 
@@ -181,7 +181,7 @@ def _read(store: Store) -> dict[str, np.ndarray]:
 
 def _limit(store: Store, steps: int | None) -> int:
     if steps is None:
-        recorded = store.info.engine == "recorded"
+        recorded = store.info.is_recorded
         return store.info.steps if recorded else min(PAPER_STEPS, store.info.steps)
     if not 0 <= steps <= store.info.steps:
         raise BadInput(
@@ -207,7 +207,7 @@ def _truth(
 
 
 def _predict_all(
-    model: NamedDynamics,
+    model: Model,
     store: Store,
     arrays: dict[str, np.ndarray],
     parts: list[tuple[np.ndarray, int]],
@@ -230,7 +230,7 @@ def _predict_all(
 
 
 def _check_finite(
-    model: NamedDynamics, store: Store, poses: np.ndarray, part: np.ndarray
+    model: Model, store: Store, poses: np.ndarray, part: np.ndarray
 ) -> None:
     """Raise `Diverged` if a pose is not finite: no mean of the model would be known."""
     lost = part[~np.isfinite(poses).all(axis=(1, 2, 3))]
@@ -280,7 +280,7 @@ def _evaluation(
     order = np.argsort(np.concatenate([part for part, _ in parts]))
     ends = [final_pose(*_truth(arrays, part, steps)) for part, steps in parts]
     final = np.concatenate(ends)[order]
-    recorded = store.info.engine == "recorded"
+    recorded = store.info.is_recorded
     names = store.info.groups
     return Evaluation(
         errors=errors,

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import predict_ends
-from sainet.models.named import NamedDynamics
+from sainet.models.model import Model
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class EndOffsets:
         return np.column_stack([np.cos(self.heading), np.sin(self.heading)])
 
 
-def end_offsets(model: NamedDynamics, store: Store) -> EndOffsets:
+def end_offsets(model: Model, store: Store) -> EndOffsets:
     """Predict every push along a path and return what the model misses of its end."""
     names = ("initial", "initial_pusher", "command_position", "steps")
     arrays = store.read(slice(None), names)

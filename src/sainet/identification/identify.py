@@ -2,61 +2,41 @@
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.store import Store
-from sainet.engines.identified import FILE, FRICTIONS, NAMES, read_values
 from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     BOUNDS,
-    Estimate,
+    FRICTIONS,
+    NAMES,
     doubt,
     names_for,
     starting_values,
+    to_engine,
 )
 from sainet.identification.residuals import Sample, Scale, pose_errors, samples
 from sainet.identification.solve import Try, solve
-from sainet.runs.documents import read_json, write_json
-from sainet.runs.errors import BadInput, BadStore
-from sainet.runs.folders import open_run, remake
+from sainet.models.identified import FILE, Estimate, Identified, read_identified
+from sainet.runs.documents import write_document
+from sainet.runs.errors import BadStore
+from sainet.runs.folders import open_run
 
 _log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
-class Identified:
-    """Estimated parameters, and the errors of the engine before and after."""
-
-    estimates: tuple[Estimate, ...]
-    pushes: int
-    before_mm: float  # mean position error at the observed steps
-    after_mm: float
-    before_deg: float
-    after_deg: float
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return JSON values; `values` are the parameters of an engine."""
-        values = {estimate.name: estimate.value for estimate in self.estimates}
-        return {"values": values, **asdict(self)}
-
-
 def identify_into(
     store: Store, out: Path, *, on_try: Try = lambda error: None
-) -> dict[str, Any]:
+) -> Identified:
     """Return the parameters in a run folder, identified there if it is unfinished.
 
     Args:
         store: see `identify`.
         out: the run folder.
         on_try: see `identify`.
-
-    Returns:
-        The content of `identified.json`, see `Identified.to_dict`.
 
     Raises:
         RunConflict: the folder belongs to another run.
@@ -67,17 +47,8 @@ def identify_into(
     check_store(store)
     folder = open_run(out, settings, finished_by=FILE)
     if not folder.is_finished:
-        write_json(out / FILE, identify(store, on_try=on_try).to_dict())
-    return _read_found(out)
-
-
-def _read_found(out: Path) -> dict[str, Any]:
-    read_values(out)
-    found = read_json(out / FILE)
-    for field in fields(Identified):
-        if field.name not in found:
-            raise BadInput(f"{out / FILE}: {field.name} is missing; {remake(out)}.")
-    return found
+        write_document(out / FILE, identify(store, on_try=on_try))
+    return read_identified(out)
 
 
 def check_store(store: Store) -> None:
@@ -132,6 +103,7 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
         doubtful, values = doubtful | new, start
     after = _mean_errors(values, parts)
     return Identified(
+        engine=to_engine(values),
         estimates=tuple(
             _estimate(name, values[name], start[name], known, doubtful)
             for name in start

@@ -2,17 +2,26 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.engines.identified import CAMERA, FRICTIONS, NAMES, RATIO, USUAL_RATIO
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.engines.simulator import (
+    UNIFORM_PRESSURE,
+    Assumptions,
+    InternalEngine,
+    PlanarSpec,
+)
+from sainet.scenes.camera import CameraOffset
 from sainet.scenes.scene import Scene
 
+FRICTIONS = ("pusher_friction", "disk_friction", "table_friction")
+RATIO = "pressure_radius_ratio"
+CAMERA = ("camera_x_mm", "camera_y_mm")  # camera-measured minus robot-measured position
+NAMES = (*FRICTIONS, RATIO, *CAMERA)
 BOUNDS = {
     **dict.fromkeys(FRICTIONS, (0.01, 2.0)),
     RATIO: (0.1, 1.0),
@@ -21,18 +30,6 @@ BOUNDS = {
 _VAGUE = 3.0  # ratio of interval ends above which a parameter is not identifiable
 _VAGUE_MM = 2.0  # the same for offsets: difference of interval ends
 _AT_BOUND = 0.01  # relative distance from a bound at which a value counts as at it
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Estimate of one parameter."""
-
-    name: str
-    value: float  # the initial value if the parameter is not identifiable
-    low: float  # of the 95 % interval
-    high: float
-    start: float  # initial value
-    doubt: str | None = None  # why the parameter is not identifiable; None if it is
 
 
 def to_coordinate(name: str, value: float) -> float:
@@ -87,7 +84,7 @@ def starting_values(
 ) -> dict[str, float]:
     """Return the initial values: the means over all scenes."""
     known = {name: _mean([getattr(one, name) for one in scenes]) for name in FRICTIONS}
-    known |= {RATIO: USUAL_RATIO, **dict.fromkeys(CAMERA, 0.0)}
+    known |= {RATIO: UNIFORM_PRESSURE, **dict.fromkeys(CAMERA, 0.0)}
     return {name: known[name] for name in names}
 
 
@@ -108,9 +105,24 @@ def with_values(
         scene,
         [jnp.broadcast_to(values[n], getattr(scene, n).shape) for n in frictions],
     )
-    return changed, PlanarEngine(pressure_radius_ratio=values.get(RATIO, USUAL_RATIO))
+    return changed, PlanarEngine(
+        pressure_radius_ratio=values.get(RATIO, UNIFORM_PRESSURE)
+    )
 
 
 def camera_at(values: Mapping[str, Float[Array, ""]]) -> Float[Array, "2"]:
     """Return the camera offset: camera-measured minus robot-measured position (m)."""
     return jnp.stack([values.get(name, jnp.zeros(())) for name in CAMERA]) / 1000
+
+
+def to_engine(values: Mapping[str, float]) -> InternalEngine:
+    """Return the engine with estimated parameters; masses and radii are the scene's."""
+    x, y = (values.get(name, 0.0) / 1000 for name in CAMERA)
+    assumptions = Assumptions(
+        pusher_friction=values.get("pusher_friction"),
+        disk_friction=values.get("disk_friction"),
+        table_friction=values.get("table_friction"),
+    )
+    ratio = values.get(RATIO, UNIFORM_PRESSURE)
+    simulator = PlanarSpec(assumptions=assumptions, pressure_radius_ratio=ratio)
+    return InternalEngine(simulator, CameraOffset(x=x, y=y))

@@ -14,7 +14,6 @@ from jaxtyping import Array
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
-from sainet.learning.assumed import find_assumed_engine
 from sainet.learning.best import Best
 from sainet.learning.config import FitConfig, ModelKind
 from sainet.learning.log import append_log, read_log, rewind_log
@@ -31,13 +30,15 @@ from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_network
 from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.identity import ModelId, TrainingData
 from sainet.models.integrators import RelaxingResidual
-from sainet.models.registry import SHIPPED, network_folder
-from sainet.runs.documents import content_hash, read_json, write_json
+from sainet.models.library import SHIPPED, find_internal_engine, network_folder
+from sainet.runs.documents import content_hash, read_json, write_document
 from sainet.runs.errors import Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, manifest
+from sainet.scenes.camera import AGREES
 
 STATE = "state.safetensors"
 Validate = Callable[[InteractionNetwork], float]
@@ -82,7 +83,7 @@ def fit(
         BadCheckpoint: training cannot go on from that network.
         Diverged: the loss left the finite numbers for good.
     """
-    assumed = find_assumed_engine(assumed_engine)
+    assumed = find_internal_engine(assumed_engine)
     from_engine = start_from == FROM_ENGINE
     start = None if from_engine else _start(start_from)
     config = config.for_pushes(store.info.pushes)
@@ -227,24 +228,45 @@ def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
 def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
     info, sain, history = task.store.info, task.model == "sain", progress.history
     data = save_arrays(folder.path / WEIGHTS, progress.network)
+    start = task.start.card if task.start else None
+    seeds = () if start is None else start.data_seeds
     card = Card(
-        model=task.model,
+        identity=_identity(task),
         kind=info.kind,
         time_step=info.time_step,
-        inner_engine=task.assumed.name if sain else None,
         truth_engine=info.engine,
-        assumed=task.assumed.beliefs if sain else None,
+        camera=task.assumed.camera if sain else AGREES,
         data=task.store.content,
-        data_seed=info.seed,
+        data_seeds=seeds if info.seed is None else (*seeds, info.seed),
         weights=content_hash(data),
-        config=asdict(task.config),
-        manifest=read_json(folder.path / MANIFEST),
-        features=task.config.features,
-        started_from=task.start.card.weights if task.start else None,
-        earlier_seeds=task.start.card.data_seeds if task.start else [],
+        started_from=start.weights if start else None,
         recurrent=task.config.recurrent,
         residual=isinstance(progress.network.integrator, RelaxingResidual),
+        config=asdict(task.config),
+        manifest=read_json(folder.path / MANIFEST),
         final_loss=history[-1]["loss"] if history else None,
     )
-    write_json(folder.path / CARD, card.to_dict())
+    write_document(folder.path / CARD, card)
     (folder.path / STATE).unlink(missing_ok=True)
+
+
+def _identity(task: Task) -> ModelId:
+    """Return the identity of the trained network."""
+    return ModelId(
+        kind=task.model,
+        simulator=task.inner.simulator if task.inner else None,
+        data=_training_data(task),
+        features=task.config.features,
+        variant="" if task.config.recurrent else "single-steps",
+    )
+
+
+def _training_data(task: Task) -> TrainingData:
+    if task.from_engine:
+        return "residual"
+    if task.start is None:
+        return "real" if task.store.info.is_recorded else "paper"
+    if task.store.info.is_recorded:
+        return "tuned"
+    is_stroke = task.store.info.bodies == 1  # long pushes of one disk
+    return "stroke" if is_stroke else task.start.card.identity.data

@@ -6,14 +6,15 @@ from pathlib import Path
 from typing import Any
 
 import jax
+import msgspec
 import numpy as np
 
 from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.predictions import add_prediction, as_measured, is_stored
 from sainet.datasets.schema import simulated_name, variables
 from sainet.datasets.splits import split_rows
 from sainet.datasets.store import Store
-from sainet.engines.identified import IDENTIFIED
-from sainet.learning.assumed import AssumedEngine
+from sainet.engines.simulator import InternalEngine, PlanarSpec, SimulatorSpec
 from sainet.learning.config import FROM_ENGINE, FitConfig, ModelKind
 from sainet.learning.loss import LossWeights
 from sainet.learning.mirror import mirror_some
@@ -28,20 +29,7 @@ from sainet.models.widen import widen
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
-_PLANAR = "planar"  # what an identified engine is with other numbers
 _ONLY_WATCHES = ("log_every", "checkpoint_every")  # settings that decide no weight
-# Settings that came later: a folder from before, which lacks them, had these.
-_LATER = {
-    "hold": 1,
-    "recurrent": True,
-    "features": "paper",
-    "terms": "motion",
-    "linear_from": 0.0,
-    "mirror": False,
-    "average": 0,
-    "validation_share": 0.0,
-    "patience": 0,
-}
 
 
 @dataclass(frozen=True)
@@ -60,13 +48,13 @@ class Task:
     model: ModelKind
     store: Store
     config: FitConfig
-    assumed: AssumedEngine
+    assumed: InternalEngine
     start: Start | None = None  # None: weights are drawn
     from_engine: bool = False  # drawn so that the network is the engine at first
 
     @property
-    def inner(self) -> AssumedEngine | None:
-        """The assumed engine whose prediction the network sees."""
+    def inner(self) -> InternalEngine | None:
+        """The internal engine of the network, if it has one."""
         return self.assumed if self.model == "sain" else None
 
     @property
@@ -75,9 +63,9 @@ class Task:
         unread = ("truth_pusher", "group", "repeat", "published")
         skip = lambda name: name.startswith(("simulated_", *unread))  # noqa: E731
         kept = [name for name in variables(self.store.info) if not skip(name)]
-        if not self.assumed.is_stored:
+        if not is_stored(self.assumed, self.store.info):
             return tuple(kept)
-        return (*kept, simulated_name(self.assumed.name))
+        return (*kept, simulated_name(self.assumed.simulator.slug))
 
     @property
     def features(self) -> FeatureSet:
@@ -111,7 +99,9 @@ class Task:
 
     def complete(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return stored arrays with the prediction that the network sees."""
-        return self.inner.predict(arrays, self.store.info) if self.inner else arrays
+        if self.inner is None:
+            return arrays
+        return add_prediction(self.inner, arrays, self.store.info)[0]
 
     def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
         """Turn stored arrays into a batch with what the network sees."""
@@ -131,17 +121,20 @@ class Task:
         return self._batch(arrays, self.store.info.steps, self.assumed)
 
     def _batch(
-        self, arrays: dict[str, np.ndarray], steps: int, inner: AssumedEngine | None
+        self, arrays: dict[str, np.ndarray], steps: int, inner: InternalEngine | None
     ) -> PushBatch:
         info, steps = self.store.info, min(steps, self.config.steps)
-        arrays = inner.predict(arrays, info) if inner else arrays
-        seen = inner.name if inner else None
-        batch = to_batch(arrays, info, steps=steps, simulated=seen)
-        batch = inner.as_seen(batch) if inner and not inner.is_stored else batch
+        simulated = None
+        if inner is not None:
+            arrays, simulated = add_prediction(inner, arrays, info)
+        batch = to_batch(arrays, info, steps=steps, simulated=simulated)
+        batch = batch if inner is None else as_measured(inner, batch)
         if self.config.recurrent:
             return batch
         # IN's statistics are of an engine's path too, but not of its single steps.
-        return to_single_steps(batch, self.inner.make() if self.inner else None)
+        return to_single_steps(
+            batch, self.inner.simulator.build() if self.inner else None
+        )
 
 
 def check_data(task: Task) -> None:
@@ -165,14 +158,14 @@ def check_data(task: Task) -> None:
 
 
 def _check_assumed(task: Task) -> None:
-    info, path, name = task.store.info, task.store.path, task.assumed.name
-    if task.assumed.is_stored and name not in info.assumed_engines:
+    info, path, simulator = task.store.info, task.store.path, task.assumed.simulator
+    if not simulator.is_identified and simulator.slug not in info.assumed_engines:
         raise BadStore(
-            f"{path}: assumed_engines has no {name!r}; give `assumed_engine` "
-            f"{' or '.join(info.assumed_engines)}, which it has, or the folder of an "
-            "identified engine."
+            f"{path}: assumed_engines has no {simulator.slug!r}; give `assumed_engine` "
+            f"{' or '.join(info.assumed_engines)}, which it has, or the folder of "
+            "identified parameters."
         )
-    if not task.assumed.is_stored and info.kind != "robot":
+    if simulator.is_identified and info.kind != "robot":
         raise BadStore(
             f"{path}: kind is {info.kind!r}; an identified engine predicts pushes of "
             "the robot setup."
@@ -183,51 +176,61 @@ def _check_start(task: Task, start: Start) -> None:
     """Raise `BadCheckpoint` if training cannot go on from that network."""
     info, card = task.store.info, start.card
     wanted = {
-        "model": task.model,
         "kind": info.kind,
         "time_step": info.time_step,
         "recurrent": task.config.recurrent,
     }
-    for name, value in wanted.items():
-        found = getattr(card, name)
+    pairs = {name: (getattr(card, name), value) for name, value in wanted.items()}
+    pairs["identity.kind"] = (card.identity.kind, task.model)
+    for name, (found, value) in pairs.items():
         if found != value:
             raise BadCheckpoint(
                 f"{start.folder / CARD}: {name} is {found!r}, this training's is "
                 f"{value!r}; give `start_from` another network."
             )
     _check_inner_engine(task, start)
-    if card.features == "place" and task.config.features == "paper":
+    if card.identity.features == "place" and task.config.features == "paper":
         raise BadCheckpoint(
             f"{start.folder / CARD}: features is 'place'; give `features` place, too."
         )
 
 
 def _check_inner_engine(task: Task, start: Start) -> None:
-    """Raise `BadCheckpoint` if what the network was trained around is too different.
+    """Raise `BadCheckpoint` if the network was trained around too different an engine.
 
-    An identified engine is the planar one with other numbers: a network that was
-    trained around that goes on from there.
+    An identified engine is the planar one with other parameters: a network that was
+    trained around the planar engine is trained further from there.
     """
-    found, wanted = start.card.inner_engine, task.inner.name if task.inner else None
-    alike = (_PLANAR, IDENTIFIED)
-    if found != wanted and not (wanted == IDENTIFIED and found in alike):
-        raise BadCheckpoint(
-            f"{start.folder / CARD}: inner_engine is {found!r}, this training's is "
-            f"{wanted!r}; give `start_from` another network."
-        )
+    found = start.card.identity.simulator
+    wanted = task.inner.simulator if task.inner else None
+    if found == wanted or (_is_planar_like(found) and _is_identified(wanted)):
+        return
+    names = [spec.slug if spec else None for spec in (found, wanted)]
+    raise BadCheckpoint(
+        f"{start.folder / CARD}: the internal engine is {names[0]!r}, this training's "
+        f"is {names[1]!r}; give `start_from` another."
+    )
+
+
+def _is_identified(spec: SimulatorSpec | None) -> bool:
+    return spec is not None and spec.is_identified
+
+
+def _is_planar_like(spec: SimulatorSpec | None) -> bool:
+    return spec == PlanarSpec() or _is_identified(spec)
 
 
 def _check_single_steps(task: Task) -> None:
     info, path = task.store.info, task.store.path
-    if info.kind != "robot" or info.engine == "recorded":
+    if info.kind != "robot" or info.is_recorded:
         raise BadStore(
             f"{path}: single steps need simulated pushes of the robot setup, whose "
             "state is known at every step; leave `recurrent` on."
         )
-    if task.inner and task.inner.make().on_host:
+    if task.inner and task.inner.simulator.build().on_host:
         raise BadInput(
-            f"`assumed_engine` {task.inner.name} cannot restart at every step of a "
-            "training; take planar, or leave `recurrent` on."
+            f"`assumed_engine` {task.inner.simulator.slug} cannot restart at every "
+            "step of a training; use planar, or train on whole pushes."
         )
 
 
@@ -236,17 +239,12 @@ def settings(task: Task) -> dict[str, Any]:
     config = asdict(task.config)
     for name in _ONLY_WATCHES:
         del config[name]
-    for name, before in _LATER.items():
-        if config[name] == before:
-            del config[name]
     start = {"start_from": task.start.card.weights} if task.start else {}
     start = {"start_from": FROM_ENGINE} if task.from_engine else start
-    computed = {} if task.assumed.is_stored else {"assumed": task.assumed.beliefs}
     return {
         "command": "train",
         "model": task.model,
-        "assumed_engine": task.assumed.name,
-        **computed,
+        "internal_engine": msgspec.to_builtins(task.assumed),
         "data": task.store.content,
         **start,
         **config,

@@ -1,15 +1,14 @@
 """Models for a robot and a camera that do not agree about where things are."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from sainet.engines.identified import camera_offset
 from sainet.models.correctors.base import Purpose
 from sainet.models.dynamics import AbstractDynamics
+from sainet.scenes.camera import CameraOffset
 from sainet.scenes.controls import Controls, move_controls, move_pusher
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -24,7 +23,7 @@ class OffsetCamera(AbstractDynamics):
     """
 
     dynamics: AbstractDynamics
-    offset: tuple[float, float] = eqx.field(static=True)  # m, camera minus robot
+    offset: CameraOffset = eqx.field(static=True)
 
     @property
     def on_host(self) -> bool:
@@ -54,17 +53,9 @@ class OffsetCamera(AbstractDynamics):
 
     @property
     def _offset(self) -> Float[Array, "2"]:
-        return jnp.array(self.offset)
+        return jnp.array(self.offset.vector)
 
 
-def with_camera(
-    dynamics: AbstractDynamics, beliefs: Mapping[str, Any]
-) -> AbstractDynamics:
-    """Return a model that knows the offset of the camera, if any is believed in.
-
-    Args:
-        dynamics: the model.
-        beliefs: as a network's card says them (`engines.identified.beliefs_of`).
-    """
-    offset = camera_offset(beliefs)
-    return OffsetCamera(dynamics, offset) if any(offset) else dynamics
+def with_camera(dynamics: AbstractDynamics, offset: CameraOffset) -> AbstractDynamics:
+    """Return a model that takes the offset of the camera into account, if any."""
+    return OffsetCamera(dynamics, offset) if offset else dynamics

@@ -21,7 +21,8 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
         BadCheckpoint: missing, damaged, of a newer format, or the two do not fit.
     """
     card = read_card(folder)
-    augmented, place = card.model == "sain", card.features == "place"
+    augmented = card.identity.kind == "sain"
+    place = card.identity.features == "place"
     features = feature_set(card.kind, simulator=augmented, place=place)
     integrator = RelaxingResidual() if card.residual else Acceleration()
     network = untrained(features, card.time_step, integrator)

@@ -48,13 +48,13 @@ _KNOWN = {
         ModelStyle("truth", "Truth", INK, DARK_INK),
         ModelStyle("physics", "Physics", "#dd7110", "#f2994a"),
         ModelStyle(
-            "physics-calibrated", "Physics, calibrated", "#b8964a", "#d9bf7c", (4, 2)
+            "physics-true", "Physics, true properties", "#b8964a", "#d9bf7c", (4, 2)
         ),
         ModelStyle("in", "IN", "#2a6fb5", "#6fb0ee", (7, 2)),
         ModelStyle("sain", "SAIN", "#00917a", "#35c7a8"),
         ModelStyle("sain-bullet", "SAIN around Bullet", "#5f8f2f", "#98c766", (5, 1.5)),
         ModelStyle(
-            "sain-calibrated", "SAIN, calibrated", "#3f7f8c", "#7cc3d1", (3, 1.5)
+            "sain-true", "SAIN, true properties", "#3f7f8c", "#7cc3d1", (3, 1.5)
         ),
     )
 }

@@ -144,7 +144,7 @@ def _worth_saying(result: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """
     every: list[Mapping[str, Any]] = list(result.get("comparisons") or ())
     models = {row["model"] for row in result.get("rows") or ()}
-    told_little = {"physics"} if "physics-calibrated" in models else set()
+    told_little = {"physics"} if "physics-true" in models else set()
     telling = [
         each
         for each in every

@@ -13,8 +13,8 @@ from sainet.datasets.store import Store, open_store
 from sainet.evaluation.evaluate import Evaluation, evaluate
 from sainet.learning.config import FitConfig, ModelKind
 from sainet.learning.fit import FitResult
-from sainet.models.named import NamedDynamics
-from sainet.models.registry import PHYSICS, load_dynamics
+from sainet.models.library import PHYSICS, load_model
+from sainet.models.model import Model
 from sainet.runs.documents import write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
@@ -135,7 +135,7 @@ class Chain:
         return open_store(self.recorded)
 
     def compare(
-        self, models: list[NamedDynamics], store: Store, *, steps: int | None = None
+        self, models: list[Model], store: Store, *, steps: int | None = None
     ) -> Evaluation:
         """Measure the errors of models on the same pushes; `steps` as of `evaluate`."""
         total = len(models) * store.info.pushes
@@ -158,13 +158,13 @@ class Chain:
 
     def models(
         self, networks: Sequence[str] = ("in", "sain"), *, engine: str = "planar"
-    ) -> list[NamedDynamics]:
-        """Return the rows of the paper's tables, physics-calibrated beside them.
+    ) -> list[Model]:
+        """Return the rows of the paper's tables, physics-true beside them.
 
         Args:
             networks: names of folders.
             engine: inside the physics models; networks have their own.
         """
         folders = [str(self.out / name) for name in networks]
-        physics = [load_dynamics(name, engine=engine) for name in PHYSICS]
-        return [*physics, *map(load_dynamics, folders)]
+        physics = [load_model(name, engine=engine) for name in PHYSICS]
+        return [*physics, *map(load_model, folders)]

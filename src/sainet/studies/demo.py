@@ -13,7 +13,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import PAPER_STEPS, Evaluation
 from sainet.learning.config import FitConfig
-from sainet.models.named import NamedDynamics
+from sainet.models.model import Model
 from sainet.report.episode_frames import outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report
@@ -29,8 +29,8 @@ _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with ass
 masses, radii and friction predicts such contacts badly (Physics); a network alone \
 learns them from data (IN); SAIN takes the engine's prediction and learns what is \
 wrong about it. All pushes here are simulated, with noise; the networks saw {pushes:,} \
-pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, calibrated \
-knows the true masses and radii, but not the friction.
+pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, true \
+properties, uses the true masses and radii, and an assumed friction.
 
 The replay shows the test push on which the engine is wrong by the median amount. Then \
 the SAIN that ships with the package, trained for all {paper:,}, pushes disk 2 to an \
@@ -110,7 +110,7 @@ def _simulate_and_train(chain: Chain, config: DemoConfig) -> Store:
 
 
 def _draw(
-    models: list[NamedDynamics],
+    models: list[Model],
     test: Store,
     evaluation: Evaluation,
     config: DemoConfig,
@@ -141,9 +141,7 @@ def _draw(
     )
 
 
-def _median_replay(
-    models: list[NamedDynamics], test: Store, evaluation: Evaluation
-) -> Replay:
+def _median_replay(models: list[Model], test: Store, evaluation: Evaluation) -> Replay:
     """Return the push on which physics is wrong by the median amount: no cherry."""
     error = evaluation.errors["physics"].final_pos_mm.mean(axis=1)
     push = int(np.argsort(error)[len(error) // 2])

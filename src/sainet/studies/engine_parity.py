@@ -15,7 +15,8 @@ from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.models.dynamics import PhysicsDynamics
-from sainet.models.named import NamedDynamics
+from sainet.models.identity import ModelId
+from sainet.models.model import Model
 from sainet.scenes.controls import Controls, PathControls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene
@@ -85,7 +86,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     return chain.finish(table)
 
 
-def _engines() -> list[NamedDynamics]:
+def _engines() -> list[Model]:
     engines: dict[str, AbstractEngine] = {
         f"planar-{ratio:.2f}": PlanarEngine(pressure_radius_ratio=ratio)
         for ratio in _RATIOS
@@ -95,4 +96,7 @@ def _engines() -> list[NamedDynamics]:
         f"bullet-at-{degrees}-deg": TurnedEngine(bullet, np.deg2rad(degrees))
         for degrees in (20, 45)
     }
-    return [NamedDynamics(k, PhysicsDynamics(v)) for k, v in engines.items()]
+    return [
+        Model(ModelId(kind="physics", name=name), PhysicsDynamics(engine))
+        for name, engine in engines.items()
+    ]

@@ -8,7 +8,8 @@ import numpy as np
 
 from sainet.datasets.store import Store
 from sainet.learning.config import FROM_ENGINE
-from sainet.models.registry import load_dynamics
+from sainet.models.identity import ModelId
+from sainet.models.library import load_model
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.few_pushes import recipe
@@ -95,8 +96,10 @@ class _Tuner:
         result = self.chain.train(
             "sain", self.training, config, name=name, start_from=start
         )
-        tuned = replace(load_dynamics(str(result.folder)), name="sain-tuned")
-        models = [load_dynamics("physics"), tuned]
+        tuned = replace(
+            load_model(str(result.folder)), id=ModelId(kind="sain", name="sain-tuned")
+        )
+        models = [load_model("physics"), tuned]
         found = self.chain.compare(models, self.tests, steps=0).to_dict()
         for row in (*found["rows"], *found["comparisons"]):
             row["group"] = name

@@ -20,7 +20,7 @@ from sainet.studies.trainings import Training
 AROUND = {
     "sain-bullet": "bullet",
     "sain": "planar",
-    "sain-calibrated": "planar-calibrated",
+    "sain-true": "planar-true",
 }
 NETWORKS = ("in", *AROUND)
 BYSTANDER = "bystander"  # what networks are called that went on beside one

@@ -5,23 +5,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import msgspec
 import numpy as np
 from jaxtyping import Int
 
 from sainet.datasets.store import Store
-from sainet.engines.identified import beliefs_of, engine_of_beliefs, read_values
 from sainet.identification.identify import identify_into
 from sainet.learning.config import FROM_ENGINE, Features, ModelKind
 from sainet.models.camera import with_camera
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
-from sainet.models.named import NamedDynamics
-from sainet.models.registry import load_dynamics, network_folder
+from sainet.models.identified import read_identified
+from sainet.models.identity import ModelId
+from sainet.models.library import load_model, network_folder
+from sainet.models.model import Model
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.few_pushes import recipe
 
-IDENTIFIED = "physics-identified"
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
 _STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
@@ -70,21 +71,25 @@ class Tuner:
     scale: Scale
     chain: Chain
 
-    def physics(self) -> list[NamedDynamics]:
-        """Return the engine as it is and with what the training pushes tell of it."""
+    def physics(self) -> list[Model]:
+        """Return the engine as it is and with parameters identified on the pushes."""
+        identified = load_model(str(self._identified()))
         return [
-            load_dynamics("physics"),
-            replace(load_dynamics(str(self._identified())), name=IDENTIFIED),
+            load_model("physics"),
+            replace(identified, id=msgspec.structs.replace(identified.id, name="")),
         ]
 
-    def models(self, variants: Sequence[Variant]) -> list[NamedDynamics]:
+    def models(self, variants: Sequence[Variant]) -> list[Model]:
         """Return networks, trained where they are to be."""
-        return [replace(self._model(each), name=each.name) for each in variants]
+        return [
+            replace(self._model(each), id=ModelId(kind=each.network, name=each.name))
+            for each in variants
+        ]
 
-    def _model(self, variant: Variant) -> NamedDynamics:
+    def _model(self, variant: Variant) -> Model:
         strokes, is_identified = _STROKES[variant.network], variant.engine != "nominal"
         if variant.learned == "simulation":
-            found = load_dynamics(strokes)
+            found = load_model(strokes)
             return self._around_identified(found) if is_identified else found
         start = {"tuned": strokes, "residual": FROM_ENGINE}.get(variant.learned)
         pushes, seen = self.training.info.pushes, {"features": variant.features}
@@ -96,14 +101,14 @@ class Tuner:
             assumed_engine=str(self._identified()) if is_identified else "planar",
             start_from=start,
         )
-        return load_dynamics(str(result.folder))
+        return load_model(str(result.folder))
 
-    def _around_identified(self, model: NamedDynamics) -> NamedDynamics:
+    def _around_identified(self, model: Model) -> Model:
         """Return a network around another engine than it was trained around."""
         network = load_network(network_folder(model.name))[0]
-        beliefs = beliefs_of(read_values(self._identified()))
-        around = SimulatorAugmented(network, engine_of_beliefs(beliefs))
-        return replace(model, dynamics=with_camera(around, beliefs))
+        internal = read_identified(self._identified()).engine
+        around = SimulatorAugmented(network, internal.simulator.build())
+        return replace(model, dynamics=with_camera(around, internal.camera))
 
     def _identified(self) -> Path:
         """Return the folder of the engine with what the training pushes tell of it."""

@@ -8,13 +8,13 @@ from jaxtyping import Float
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.models.dynamics import predict
-from sainet.models.named import NamedDynamics
+from sainet.models.model import Model
 from sainet.report.replay import Replay, Track
 from sainet.scenes.state import State, Trajectory
 
 
 def build_replay(
-    models: Sequence[NamedDynamics], store: Store, push: int, *, title: str, steps: int
+    models: Sequence[Model], store: Store, push: int, *, title: str, steps: int
 ) -> Replay:
     """Return one push as it was and as each model predicts it.
 
@@ -44,7 +44,7 @@ def build_replay(
 
 
 def error_curves(
-    models: Sequence[NamedDynamics], store: Store, *, steps: int, pushes: int
+    models: Sequence[Model], store: Store, *, steps: int, pushes: int
 ) -> dict[str, Float[np.ndarray, "time body"]]:
     """Return each model's mean position error (mm) over the time of a push."""
     arrays = store.read(slice(0, min(pushes, store.info.pushes)))
@@ -58,7 +58,7 @@ def error_curves(
     return curves
 
 
-def _predict(model: NamedDynamics, batch: PushBatch) -> Trajectory:
+def _predict(model: Model, batch: PushBatch) -> Trajectory:
     return predict(model.dynamics, batch.scene, batch.initial, batch.controls)
 
 

@@ -4,10 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from sainet.control.record import read_record
 from sainet.control.trials import FOLDER
-from sainet.engines.identified import FILE as IDENTIFIED
 from sainet.models.card import CARD, read_card
+from sainet.models.identified import FILE as IDENTIFIED
+from sainet.models.identified import Identified, read_identified
 from sainet.report.pages.page import REPORT, Report, to_page
 from sainet.runs.documents import read_json
 from sainet.runs.errors import BadInput
@@ -38,11 +41,12 @@ def report_of(folder: Path) -> Report:
     if not folder.is_dir():
         raise BadInput(f"{folder}: no such folder; give one that sainet made.")
     table = _json(folder / TABLE)
-    card = read_card(folder).to_dict() if (folder / CARD).is_file() else {}
-    identified = _json(folder / IDENTIFIED)
+    card = msgspec.to_builtins(read_card(folder)) if (folder / CARD).is_file() else {}
+    is_identified = (folder / IDENTIFIED).is_file()
+    said = _estimates(read_identified(folder)) if is_identified else ()
     episodes = [read_record(path) for path in _episode_files(folder)]
     figures = tuple(_figures(folder))
-    if not (table or card or identified or episodes or figures):
+    if not (table or card or is_identified or episodes or figures):
         raise BadInput(f"{folder}: nothing to show in it{_way_out(folder)}.")
     settings = {**_json(folder / CONFIG), **card}
     made = settings.pop("manifest", None) or _json(folder / MANIFEST)
@@ -50,7 +54,7 @@ def report_of(folder: Path) -> Report:
     return Report(
         title=folder.resolve().name,
         subtitle=f"What 'sainet {command}' left there" if command else "",
-        summary="\n\n".join(_estimates(identified)),
+        summary="\n\n".join(said),
         table=table or None,
         figures=figures,
         episodes=episodes,
@@ -96,22 +100,22 @@ def _figures(folder: Path) -> Iterator[tuple[Path, str]]:
             yield folder / f"{name}.svg", told
 
 
-def _estimates(identified: dict[str, Any]) -> Iterator[str]:
-    """Yield what was identified, in sentences."""
-    for estimate in identified.get("estimates", ()):
-        name = estimate["name"].replace("_", " ")
-        if estimate["doubt"]:
-            yield f"{name} is not identifiable: {estimate['doubt']}."
+def _estimates(identified: Identified) -> Iterator[str]:
+    """Yield estimates and errors, in sentences."""
+    for estimate in identified.estimates:
+        name = estimate.name.replace("_", " ")
+        if estimate.doubt:
+            yield f"{name} is not identifiable: {estimate.doubt}."
         else:
             yield (
-                "{name}: {value:.3g} [{low:.3g}, {high:.3g}], {start:.3g} before."
-            ).format(**estimate | {"name": name.capitalize()})
-    if identified:
-        yield (
-            "Mean errors of {pushes} pushes: position {before_mm:.2f} mm before, "
-            "{after_mm:.2f} mm after; rotation {before_deg:.2f} and {after_deg:.2f} "
-            "degrees."
-        ).format(**identified)
+                f"{name.capitalize()}: {estimate.value:.3g} [{estimate.low:.3g}, "
+                f"{estimate.high:.3g}], initially {estimate.start:.3g}."
+            )
+    yield (
+        f"Mean errors of {identified.pushes} pushes: position "
+        f"{identified.before_mm:.2f} mm before, {identified.after_mm:.2f} mm after; "
+        f"rotation {identified.before_deg:.2f} and {identified.after_deg:.2f} degrees."
+    )
 
 
 def _way_out(folder: Path) -> str:

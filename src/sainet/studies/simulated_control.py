@@ -18,7 +18,7 @@ from sainet.studies.config import Scale
 from sainet.studies.published import SIMULATED_CONTROL
 
 TRIALS = {"quick": 4, "paper": 100}
-MODELS = ("physics", "physics-calibrated", "in", "sain")
+MODELS = ("physics", "physics-true", "in", "sain")
 GOALS = ("easy", "hard")
 PLANNERS = ("greedy", "tree")
 

@@ -20,10 +20,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import j0
 
-from sainet.datasets.assumed import simulate
 from sainet.datasets.derive import derive
+from sainet.datasets.predictions import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
+from sainet.engines.simulator import simulator_named
 from sainet.studies.chain import Chain
 from sainet.studies.strokes import STROKES
 
@@ -132,7 +133,7 @@ def _as_recorded(
         "rate_observed": np.zeros_like(observed),
     }
     names = [f"simulated push {number}" for number in push]
-    motion = simulate(_ENGINE, known, info, names)
+    motion = simulate(simulator_named(_ENGINE), known, info, names)
     return known | {simulated_name(_ENGINE): motion}
 
 

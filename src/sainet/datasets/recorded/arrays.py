@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
-from sainet.datasets.assumed import simulate
+from sainet.datasets.predictions import simulate
 from sainet.datasets.recorded.push import RecordedPush
-from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
+from sainet.datasets.schema import RECORDED, Arrays, StoreInfo, simulated_name
 from sainet.datasets.writer import create_arrays, finish, write_chunk
+from sainet.engines.simulator import simulator_named
 from sainet.scenes.scene import TIME_STEP
 
-STORED_ENGINES = ("planar", "planar-calibrated")  # whose s-bar imports keep
+STORED_ENGINES = ("planar", "planar-true")  # whose s-bar imports keep
 _CHUNK_SIZE = 250  # pushes
 _CHUNK_STEPS = 300_000  # of all bodies, so that chunks of long pushes stay small
 
@@ -89,7 +90,7 @@ def store_info(pushes: Sequence[RecordedPush]) -> StoreInfo:
         steps=steps,
         chunk_size=max(1, min(_CHUNK_SIZE, limit)),
         time_step=TIME_STEP,
-        engine="recorded",
+        engine=RECORDED,
         assumed_engines=STORED_ENGINES,
         groups=tuple(sorted(named)),
         has_repeats=all(push.plan for push in pushes),
@@ -112,7 +113,7 @@ def chunk_arrays(
     }
     names = [push.name for push in pushes]
     simulated = {
-        simulated_name(engine): simulate(engine, arrays, info, names)
+        simulated_name(engine): simulate(simulator_named(engine), arrays, info, names)
         for engine in info.assumed_engines
     }
     return arrays | simulated

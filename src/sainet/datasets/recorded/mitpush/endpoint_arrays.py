@@ -3,11 +3,12 @@
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.assumed import simulate
+from sainet.datasets.predictions import simulate
 from sainet.datasets.recorded.arrays import numbered
 from sainet.datasets.recorded.mitpush.disk import MASS, PUSHER_RADIUS, RADIUS
 from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog
-from sainet.datasets.schema import StoreInfo, published_name, simulated_name
+from sainet.datasets.schema import RECORDED, StoreInfo, published_name, simulated_name
+from sainet.engines.simulator import simulator_named
 from sainet.scenes.scene import TIME_STEP
 
 STROKE = 0.050  # m: recorded ones are within 0.7 mm of it
@@ -24,7 +25,7 @@ def store_info(log: EndpointLog) -> StoreInfo:
         steps=int(_steps(log).max()),
         chunk_size=_CHUNK_SIZE,
         time_step=TIME_STEP,
-        engine="recorded",
+        engine=RECORDED,
         assumed_engines=(ASSUMED_ENGINE,),
         groups=tuple(sorted(set(_groups(log)))),
         published=(log.model,),
@@ -76,7 +77,7 @@ def to_arrays(
     if log.plan is not None:
         arrays["repeat"] = numbered(log.plan)
     names = [f"{log.path}: {place}" for place in log.places]
-    motion = simulate(ASSUMED_ENGINE, arrays, info, names)
+    motion = simulate(simulator_named(ASSUMED_ENGINE), arrays, info, names)
     return arrays | {simulated_name(ASSUMED_ENGINE): motion}
 
 

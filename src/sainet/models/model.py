@@ -1,23 +1,30 @@
-"""A model with its name, and what its network may be used for."""
+"""A model with its identity, and what its network may be used for."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from sainet.models.card import CARD, Card
 from sainet.models.dynamics import AbstractDynamics
+from sainet.models.identity import ModelId
 from sainet.runs.errors import BadCheckpoint
 
 _SAME_TIME = 1e-9  # s
 
 
 @dataclass(frozen=True)
-class NamedDynamics:
-    """A model, what to call it in tables, and the card of its network if any."""
+class Model:
+    """A dynamics model, its identity, and the card of its network if it has one."""
 
-    name: str
+    id: ModelId
     dynamics: AbstractDynamics
     card: Card | None = None
-    folder: Path | None = None  # of what was trained or identified
+    folder: Path | None = None  # of a trained network or identified parameters
+    digest: str | None = None  # hash of the weights or the identified parameters
+
+    @property
+    def name(self) -> str:
+        """The name in tables and JSON."""
+        return self.id.slug
 
     def check_fits(
         self,
@@ -30,10 +37,10 @@ class NamedDynamics:
         """Raise `BadCheckpoint` if the network is not for these pushes.
 
         Args:
-            kind: of the pushes.
-            time_step: s, of the pushes.
-            seed: of simulated pushes that are to test the network; None otherwise.
-            data: hash of the pushes that are to test the network, if any are.
+            kind: setup of the pushes.
+            time_step: of the pushes (s).
+            seed: of simulated test pushes; None otherwise.
+            data: hash of the test pushes, if the network is tested on any.
         """
         if self.card is None:
             return
@@ -50,8 +57,7 @@ class NamedDynamics:
             )
         if seed is not None and seed in self.card.data_seeds:
             raise BadCheckpoint(
-                f"{path}: data_seed is {seed} (its own, or that of the network which "
-                "it started from), and so is the seed of the data: the network may "
+                f"{path}: data_seeds has {seed}, the seed of the data: the network may "
                 "have been trained on these very pushes. Generate others with another "
                 "`seed`, or give `force`."
             )
