@@ -51,7 +51,7 @@ show_progress() {
             case "$name" in *.whl) name=${name##*/} name=${name%-*-*-*} ;; esac
             printf '\n  %3d/%s  %s' "$count" "$1" "$name" ;;
         Downloading | Using) printf ' %s' "${rest##* (}" | tr -d ')' ;;
-        Ignoring) printf '\n  not installed: %s' "$rest" ;;
+        Ignoring) printf '\n  not for this Python: %s' "${rest%%: *}" ;;
         Installing) printf '\n  unpacking' ;;
         exit) printf '\n'; return "$rest" ;;
         esac

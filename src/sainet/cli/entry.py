@@ -18,6 +18,7 @@ from sainet.cli.control import Control
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
 from sainet.cli.generate import Generate
+from sainet.cli.help import option_registry
 from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
 from sainet.cli.messages import message
@@ -87,6 +88,7 @@ def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
         args=list(words) or ["--help"],
         prog="sainet",
         description=_DESCRIPTION,
+        registry=option_registry(),
         config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
     )
 
