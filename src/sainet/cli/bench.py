@@ -11,12 +11,12 @@ from sainet.cli.output import Output
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure how fast this machine is at the heavy parts."""
+    """Measure the speed of training, engines and planning on this machine."""
 
     cases: Positional[tuple[str, ...]] = ()
-    """training, engines, planning; default: all."""
+    """Benchmark cases: training, engines, planning. Default: all."""
     devices: int | None = None
-    """CPU devices to split a batch over; default: one a core."""
+    """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

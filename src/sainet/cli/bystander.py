@@ -11,18 +11,17 @@ from sainet.cli.progress import progress_bar
 
 @dataclass(frozen=True, kw_only=True)
 class AddBystander:
-    """Lay one disk more beside each push, untouched: it teaches what does not act.
+    """Add a bystander, a disk that nothing touches, to each push of a dataset.
 
-    A network that goes on from there does better among more disks than it was trained
-    on: `sainet train sain --start-from sain --data OUT --out DIR`.
+    Networks trained further on such pushes predict scenes of more disks better.
     """
 
     data: Path
-    """Dataset of pushes whose paths are known all the way, simulated ones say."""
+    """Dataset of pushes with complete trajectories, for example simulated pushes."""
     out: Path
-    """Run folder to write."""
+    """Run folder to write, a dataset."""
     seed: int = 0
-    """Of the masses, radii and places of the bystanders."""
+    """Random seed of the masses, radii and places of the bystanders."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:
@@ -35,7 +34,7 @@ class AddBystander:
         require(self.seed >= 0, "seed", "at least 0", self.seed)
         store = open_store(self.data)
         total = store.info.pushes * len(store.info.assumed_engines)
-        with progress_bar("Predicting s-bar", total, self.output) as advance:
+        with progress_bar("Simulator predictions", total, self.output) as advance:
             found = add_bystander(
                 store, self.out, seed=self.seed, on_pushes=lambda n: advance(n, "")
             )

@@ -18,17 +18,16 @@ _DRAWN = 6  # episodes
 
 @dataclass(frozen=True, kw_only=True)
 class Control:
-    """Push the last disk to goals by pushing the first, in a simulated world."""
+    """Push the target disk to goals by pushing disk 1, in a simulated world."""
 
     config: ControlConfig = field(default_factory=ControlConfig)
     out: Path = Path("runs/control")
-    """Run folder to write, a file for each episode; the same settings go on where they
-    stopped."""
+    """Run folder to write, one file per episode; identical settings resume."""
     animate: bool = False
-    """Also draw a film of the first episode (MP4 with the extra `video`, else GIF) and
-    replay.html, a page that plays the first six."""
+    """Also draw a film of the first episode (MP4 with the extra video, else GIF) and
+    replay.html, a page that plays the first six episodes."""
     workers: int | None = None
-    """Processes; default: one a core. The result does not depend on it."""
+    """Number of processes, which does not affect the result. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

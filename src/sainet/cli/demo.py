@@ -14,13 +14,13 @@ from sainet.studies.config import DemoConfig
 
 @dataclass(frozen=True, kw_only=True)
 class Demo:
-    """Show the whole method, small: simulate, train, compare, look."""
+    """Run the whole method at small scale: simulate, train, compare, push to goals."""
 
     out: Path = Path("runs/demo")
-    """Run folder to write; ends with report.html."""
+    """Run folder to write, with report.html."""
     config: DemoConfig = field(default_factory=DemoConfig)
     devices: int | None = None
-    """CPU devices to split a batch over; default: one a core."""
+    """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

@@ -66,10 +66,9 @@ def _start_from(words: Sequence[str]) -> str | None:
     return None
 
 
-_DESCRIPTION = """Simulator-augmented interaction networks: teach a physics engine what
-it gets wrong about pushed disks, and measure how much better it became.
+_DESCRIPTION = """Simulator-augmented interaction networks for pushed disks.
 
-Start with 'sainet demo': the whole method, small, in under three minutes."""
+Start with 'sainet demo', which runs the whole method at small scale."""
 
 INTERRUPTED = 130
 # Commands that an identical call resumes.

@@ -17,22 +17,22 @@ class Evaluate:
     """Measure the errors of several models on the same stored pushes."""
 
     model: tuple[str, ...] = ()
-    """physics, physics-true, shipped networks (in, sain, sain-bullet), or folders
-    of trained ones. Default: physics and the shipped networks that fit the data."""
+    """Models to compare: physics, physics-true, shipped networks (in, sain,
+    sain-bullet), or run folders of trained networks. Default: physics and the shipped
+    networks that fit the data."""
     data: Path
-    """Dataset to predict."""
+    """Dataset of pushes to predict."""
     group: str | None = None
-    """Group of pushes to predict (default: all groups)."""
+    """Group of pushes to predict. Default: all groups."""
     steps: int | None = None
-    """Steps to predict, 0 for all; default: 200, all of recorded pushes."""
+    """Number of steps to predict; 0 for all. Default: 200, of recorded pushes all."""
     engine: str | None = None
-    """Engine inside the models. Default: planar for physics, for a network the one that
-    it was trained around."""
+    """Internal engine of the models. Default: planar for physics, for networks the
+    engine of their training."""
     force: bool = False
-    """Use networks on other pushes, and around other engines, than they were trained
-    for."""
+    """Skip data and engine compatibility checks."""
     devices: int | None = None
-    """CPU devices to split a batch over; default: one a core."""
+    """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

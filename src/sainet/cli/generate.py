@@ -12,13 +12,13 @@ from sainet.runs.workers import worker_pool
 
 @dataclass(frozen=True, kw_only=True)
 class Generate:
-    """Simulate pushes with the paper's distributions and store them."""
+    """Simulate pushes with the paper's distributions, and store them as a dataset."""
 
     config: GenerateConfig = field(default_factory=GenerateConfig)
     out: Path
-    """Run folder to write; the same settings go on where they stopped."""
+    """Run folder to write; identical settings resume."""
     workers: int | None = None
-    """Processes; default: one a core. The result does not depend on it."""
+    """Number of processes, which does not affect the result. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from tyro.constructors import (
 )
 
 # A text states the default that its value, None or empty, does not show.
-_DEFAULT = re.compile(r"\s*Default: (?P<value>.+)\.$")
+_DEFAULT = re.compile(r"[\s(]*[Dd]efault: (?P<value>.+?)\)?\.$")
 
 
 def option_registry() -> ConstructorRegistry:

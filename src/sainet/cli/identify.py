@@ -11,14 +11,14 @@ from sainet.cli.progress import progress_bar
 
 @dataclass(frozen=True, kw_only=True)
 class Identify:
-    """Fit the planar engine's parameters and the camera's offset to observed pushes."""
+    """Estimate the planar engine's parameters and the camera offset from pushes."""
 
     data: Path
-    """Dataset of pushes along paths, observed at their ends at least."""
+    """Dataset of path-controlled pushes with measured poses, at least at both ends."""
     out: Path
-    """Run folder to write; a model wherever one is expected."""
+    """Run folder to write, usable as a model."""
     group: str | None = None
-    """Take the pushes of this group alone, abs-10 say; default: all."""
+    """Group of pushes to use, for example abs-10. Default: all."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

@@ -11,12 +11,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """Options that every command has."""
+    """Options of every command."""
 
     json: bool = False
-    """End with one JSON object on standard output; all else goes to standard error."""
+    """Print the result as one JSON object on standard output, all other text on
+    standard error."""
     quiet: bool = False
-    """Show no progress."""
+    """Hide progress."""
 
     @property
     def console(self) -> "Console":

@@ -11,10 +11,10 @@ from sainet.cli.output import Output
 
 @dataclass(frozen=True, kw_only=True)
 class MakeReport:
-    """Write report.html into a run folder: one page that needs nothing else."""
+    """Write report.html, a self-contained page, into a run folder."""
 
     folder: Positional[Path]
-    """What train, control, identify, demo or one experiment of reproduce made."""
+    """Run folder of train, control, identify, demo or one experiment of reproduce."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

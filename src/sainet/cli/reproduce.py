@@ -24,27 +24,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce:
-    """Make tables again, each step once: finished ones are not run again."""
+    """Reproduce tables; finished steps are not repeated."""
 
     experiments: Positional[tuple[str, ...]] = ()
-    """direct-force-two-disks (the paper's Table I), direct-force-three-disks (II) and
-    robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
-    regularisation and robustness with the networks of Table III; simulated-control
-    with the shipped ones; robot-planar; engine-parity; fine-tuning (its settings,
-    chosen on simulated pushes); recorded-pushes and recorded-data-efficiency, which
-    need --recorded. Default: all that can be made."""
+    """Experiments: direct-force-two-disks (the paper's Table I),
+    direct-force-three-disks (II) and robot-two-disks (III), with Bullet;
+    data-efficiency, recurrent-or-not, regularisation and robustness, with the networks
+    of Table III; simulated-control, with shipped networks; robot-planar; engine-parity;
+    fine-tuning (settings chosen on simulated pushes); recorded-pushes and
+    recorded-data-efficiency, which need --recorded. Default: every experiment whose
+    requirements are met."""
     scale: Scale = "quick"
-    """quick: minutes. paper: 4,500 pushes and 10,000 iterations."""
+    """Size of datasets and training runs: quick for minutes per table, paper for 4,500
+    pushes and 10,000 iterations per network."""
     out: Path = Path("runs/reproduce")
-    """Folder to write, a folder in it for each experiment."""
+    """Folder to write, with one run folder per experiment."""
     recorded: Path | None = None
-    """Dataset of recorded pushes: what 'sainet import mitpush-endpoints' made."""
+    """Dataset of recorded pushes, from 'sainet import mitpush-endpoints'.
+    Default: none."""
     trainers: int | None = None
-    """Networks to train at once, each on a core of its own, about 1 GB each; 1 trains
-    one by one, with its batch split over all devices. Default: one a core; 1 on a
-    GPU."""
+    """Number of networks trained at once, one per core and about 1 GB each; with 1, all
+    devices share each batch. Default: one per core, 1 on a GPU."""
     devices: int | None = None
-    """CPU devices to split a batch over; default: one a core."""
+    """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:

@@ -26,38 +26,41 @@ _LEAST_TOLERANCE = 1e-6  # of a radius
 
 @dataclass(frozen=True, kw_only=True)
 class ControlConfig:
-    """Which model pushes in which world, how often, and to what goals."""
+    """Model, world, goals and number of trials."""
 
     model: str = "sain"
-    """physics, physics-true, a shipped network, or a trained one's folder."""
+    """Model that plans: physics, physics-true, a shipped network, or the run
+    folder of a trained network."""
     goals: Goals = "easy"
-    """easy: within 30 degrees of the disks' axis. hard: 30 to 60 to either side."""
+    """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
+    either side)."""
     planner: str = "greedy"
-    """greedy: the paper's search. tree: every sequence of two pushes."""
+    """Planner: greedy (the paper's search) or tree (every sequence of two pushes)."""
     world: str = "planar"
-    """Engine that stands for the robot's world: planar, or bullet as in the paper."""
+    """Engine of the simulated world: planar, or bullet as in the paper."""
     trials: int = 25
-    """Goals to push to, each once."""
+    """Number of trials, one goal each."""
     seed: int = 0
-    """Of goals, friction and noise; models see the same ones."""
+    """Random seed of goals, friction and noise, equal for all models."""
     pushes: int = 60
-    """Pushes before an episode is given up."""
+    """Maximum pushes per episode."""
     disks: int = 2
-    """Disks in a row, the last of which is to be moved by pushing the first."""
+    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
     knows: Knowledge = "true"
-    """What the network is told of the disks: their true masses and radii, or the
-    nominal ones that the assumed engine believes in."""
+    """Masses and radii given to the network: true, or nominal (the assumed
+    properties)."""
     tolerance: float = 0.1
-    """Of the moved disk's radius, within which its goal is reached."""
+    """Success tolerance (fraction of target-disk radius)."""
     aim: float = 0.9
-    """Of the tolerance, within which the disk has to be seen before an episode ends:
-    sight is noisy, and this leaves room for four standard deviations of it."""
+    """Stopping tolerance: measured distance that ends an episode (fraction of the
+    tolerance). The default leaves four standard deviations of measurement noise."""
     alignment: float = 3.0
-    """Weight (m) of the cosine distance in the heuristic."""
+    """Weight of the cosine distance in the heuristic (m)."""
     deadline: float | None = None
-    """Seconds after which the tree planner takes the best plan so far."""
+    """Time limit of a decision of the tree planner (s), after which it returns the best
+    plan so far. Default: none."""
     noise_level: NoiseLevel = "default"
-    """Size of the world's noise: none, default or paper-like."""
+    """Scale of the world's noise; paper-like is three times the default."""
 
     def __post_init__(self) -> None:
         """Check every setting."""

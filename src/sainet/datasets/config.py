@@ -58,58 +58,59 @@ _QUANTITIES = {
 class GenerateConfig:
     """Simulated pushes with the distributions of the paper (section IV-B).
 
-    A range is two numbers, drawn from uniformly, or one that is always taken.
+    A range is a uniform distribution between two numbers, or one constant.
     """
 
     setup: Positional[Setup] = "robot"
-    """robot: the pusher follows a path. direct-force: a force drives it."""
+    """Setup: robot (the pusher follows a path) or direct-force (a force drives it)."""
     disks: int = 2
     """Number of disks."""
     pushes: int = 4500
     """Number of pushes."""
     engine: str = "planar"
-    """Engine that makes the truth."""
+    """Engine of the ground truth: planar or bullet."""
     assumed_engine: tuple[str, ...] = ("planar",)
-    """Internal engines whose simulator predictions are stored: planar or bullet with
-    the paper's assumed properties, planar-true or bullet-true with true masses and
+    """Engines of the stored simulator predictions: planar or bullet with the paper's
+    assumed properties, planar-true or bullet-true with the true masses and
     radii."""
     seed: int = 0
-    """Of everything random; the same seed gives the same bytes."""
+    """Random seed; equal seeds give byte-identical datasets."""
     mass_kg: Range = (0.85, 1.15)
-    """Mass of a disk."""
+    """Mass of a disk (kg, range)."""
     radius_mm: Range = (50.0, 60.0)
-    """Radius of a disk."""
+    """Radius of a disk (mm, range)."""
     table_friction: Range = (0.05, 0.25)
-    """Friction between disks and table, one value for each push."""
+    """Friction coefficient between disks and table (range, one value per push)."""
     contact_friction: Range = (0.25,)
-    """Friction between disks, and between disk and pusher."""
+    """Friction coefficient between disks, and between disk and pusher (range)."""
     pusher_radius_mm: float = 4.8
-    """Radius of the pusher."""
+    """Radius of the pusher (mm)."""
     contact_angle_deg: float = 60.0
-    """Greatest contact angle, to either side of the back of disk 1."""
+    """Largest contact angle, from the back of disk 1 to either side (degrees)."""
     direction_deg: float = 30.0
-    """Greatest angle between the push and the contact normal, to either side."""
+    """Largest push direction, relative to the contact normal (degrees)."""
     placement_deg: float = 60.0
-    """Greatest angle at which a disk is placed in front of another."""
+    """Largest angle between the line of two neighbouring disks and the push frame's x
+    axis (degrees)."""
     gap_mm: float = 0.0
-    """Gap between touching disks, and between disk 1 and the pusher, at the start."""
+    """Initial gap between neighbouring disks, and between disk 1 and pusher (mm)."""
     stroke_mm: Range = (10.0,)
-    """Length of a push (robot)."""
+    """Stroke of a push (mm, range; robot)."""
     speed_mm_s: Range = (50.0,)
-    """Speed of a push (robot)."""
+    """Speed of a push (mm/s, range; robot)."""
     hold_steps: int = 152
-    """Steps that follow the stroke (robot): 48 + 152 = 200. The sum is rounded up to
-    whole 40s."""
+    """Number of steps after the stroke (robot). The total, 48 + 152 = 200 with the
+    defaults, is rounded up to a multiple of 40."""
     force_n: float = 8.0
-    """Force on the pusher (direct force)."""
+    """Force on the pusher (N; direct force)."""
     force_steps: int = 480
-    """Steps that the force lasts (direct force): 2 s."""
+    """Number of steps with force (direct force), 1/240 s each."""
     noise_level: NoiseLevel = "default"
-    """Size of all noise: none, default or paper-like (three times the default)."""
+    """Scale of all noise; paper-like is three times the default."""
     noise: NoiseConfig = field(default_factory=NoiseConfig)
     """The sources of noise."""
     chunk_size: int = 250
-    """Pushes that are simulated, written and read at a time."""
+    """Number of pushes per chunk, which are simulated, written and read together."""
 
     def __post_init__(self) -> None:
         """Check every setting."""

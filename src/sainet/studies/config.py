@@ -8,13 +8,13 @@ Scale = Literal["quick", "paper"]
 
 @dataclass(frozen=True, kw_only=True)
 class DemoConfig:
-    """How small the demo is."""
+    """Size of the demo."""
 
     pushes: int = 1000
-    """Pushes to train on."""
+    """Number of training pushes."""
     test_pushes: int = 200
-    """Pushes to compare the models on."""
+    """Number of test pushes."""
     iterations: int = 300
-    """Gradient steps for each network."""
+    """Number of iterations per network."""
     seed: int = 0
-    """Of everything random."""
+    """Random seed."""
