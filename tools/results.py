@@ -23,10 +23,10 @@ from typing import Any
 from headlines import main as write_headlines
 from readings import ERRORS, FINAL_ERRORS, of_control, of_errors, of_groups
 from receipts import RECEIPTS, keep, restore
-from sainet.engines.identified import CAMERA
 
 from sainet.control.record import read_record
 from sainet.control.trials import episode_file
+from sainet.identification.parameters import CAMERA
 from sainet.learning.config import RESIDUAL_TUNING, FitConfig
 from sainet.models.library import OF_STROKES
 from sainet.report.control_table import control_markdown
