@@ -235,7 +235,7 @@ def test_a_loss_that_is_no_number_stops_the_training(store, tmp_path, monkeypatc
 
 
 def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
-    says = "assumed_engines has no 'bullet'; use planar, which it has"
+    says = "assumed_engines has no 'bullet'; give `assumed_engine` planar, which"
     with pytest.raises(BadStore, match=says):
         fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
     assert not (tmp_path / "out").exists()
