@@ -3,11 +3,15 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from datasets.own_pushes import PROPERTIES, rows, to_csv, write
 from datasets.raw_pushes import name, pack, recording, to_json
 from sainet.cli.entry import run
+from sainet.datasets import batch, predictions
+from sainet.datasets.store import open_store
+from sainet.runs.errors import BadStore
 
 
 @pytest.fixture
@@ -42,7 +46,8 @@ def test_a_folder_that_cannot_be_made_is_one_line(
     out = tmp_path / ("x" * 300)
     assert run(["import", "mitpush", *sources["mitpush"], "--out", str(out)]) == 2
     error = capfd.readouterr().err
-    assert f"sainet: {out}: cannot be read" in error
+    assert error.startswith(f"sainet: {tmp_path}/x")
+    assert "cannot be read (File name too long)" in error
     assert len(error.splitlines()) == 1
 
 
@@ -51,9 +56,12 @@ def test_a_folder_that_cannot_be_made_is_one_line(
     [
         (["table", "TABLE"], "--properties is missing"),
         (["mitpush", "ZIP", "--properties", "BODIES"], "--properties is for the"),
-        (["mitpush", "TABLE"], "is no .zip and no folder"),
-        (["table", "ZIP", "--properties", "BODIES"], "is no .csv and no .parquet"),
-        (["table", "TABLE", "--properties", "TABLE"], "is no TOML"),
+        (["mitpush", "TABLE"], "neither a .zip nor a folder"),
+        (
+            ["table", "ZIP", "--properties", "BODIES"],
+            "unsupported file type; use .csv or .parquet",
+        ),
+        (["table", "TABLE", "--properties", "TABLE"], "not TOML"),
         (["mitpush", "x" * 300], "cannot be read"),
         (["mitpush-endpoints", "x" * 300], "cannot be read"),
         (["table", "x" * 300 + ".csv", "--properties", "BODIES"], "cannot be read"),
@@ -74,16 +82,26 @@ def test_bad_usage_is_one_line_and_status_2(
 
 
 def test_a_push_that_an_engine_cannot_follow_is_named(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch
 ):
-    light = PROPERTIES.replace("mass = 1.0", "mass = 1e-42")
-    table, bodies = write(tmp_path / "in", to_csv(rows("a-7")), light)
+    real = batch.from_trajectory
+
+    def broken(trajectory):
+        motion, pusher = real(trajectory)
+        return np.full_like(motion, np.nan), pusher
+
+    monkeypatch.setattr(predictions, "from_trajectory", broken)
+    table, bodies = write(tmp_path / "in", to_csv(rows("a-7")))
     words = ["import", "table", str(table), "--properties", str(bodies)]
-    assert run([*words, "--out", str(tmp_path / "out")]) == 1
+    out = tmp_path / "out"
+    assert run([*words, "--out", str(out)]) == 1
     error = capfd.readouterr().err
-    assert error.startswith(f"sainet: {table}: push 'a-7': the engine planar-calib")
+    assert error.startswith(f"sainet: {table}: push 'a-7': the engine planar")
     assert len(error.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
+    with pytest.raises(BadStore):
+        open_store(out)
+    monkeypatch.undo()
+    assert run([*words, "--out", str(out), "--quiet"]) == 0
 
 
 def test_the_command_line_goes_before_the_properties(sources, tmp_path: Path):

@@ -7,9 +7,15 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from sainet.datasets.recorded.mitpush.endpoint_csv import NUMBERS
-from sainet.datasets.recorded.mitpush.endpoint_log import EndpointLog, read_log
-from sainet.datasets.recorded.mitpush.endpoint_mat import FIELDS
+from sainet.datasets.recorded.endpoints import (
+    COLUMNS,
+    Endpoints,
+    find_log,
+    read_endpoints,
+)
+from sainet.datasets.recorded.mat import FIELDS, read_mat
+from sainet.datasets.recorded.properties import mitpush_properties
+from sainet.datasets.recorded.tables import Problems
 from sainet.runs.errors import BadTable
 
 ROW = {
@@ -19,6 +25,28 @@ ROW = {
     **{"tip_x0": 0.2427, "tip_y0": 0.0, "tip_x1": 0.2927, "tip_y1": 0.0},
     **{"zhou_poly4_x1": 0.321, "zhou_poly4_y1": 0.012, "zhou_poly4_th1": 1.25},
 }
+
+
+def read_log(path: Path) -> Endpoints:
+    file = find_log(path)
+    return read_endpoints(file, file.read_bytes(), mitpush_properties(0.25, 0.15))
+
+
+def poses(log: Endpoints, sample: int) -> np.ndarray:
+    """All poses before (0) or after (1) the push."""
+    return np.array([recording.pose[sample, 0] for recording in log.recordings])
+
+
+def tips(log: Endpoints, sample: int) -> np.ndarray:
+    return np.array([recording.pusher[sample] for recording in log.recordings])
+
+
+def surfaces(log: Endpoints) -> list[str]:
+    return [recording.conditions.surface for recording in log.recordings]
+
+
+def plans(log: Endpoints) -> list[str]:
+    return [recording.plan for recording in log.recordings]
 
 
 def write_csv(path: Path, *rows: dict) -> Path:
@@ -49,33 +77,32 @@ def refusal(path: Path) -> str:
     return message
 
 
-def assert_same(one: EndpointLog, other: EndpointLog):
-    names = ("speed", "before", "after", "tip_before", "tip_after", "published")
-    for name in names:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-    assert one.surface == other.surface
-    assert one.shape == other.shape
+def assert_same(one: Endpoints, other: Endpoints):
+    np.testing.assert_array_equal(one.published, other.published)
     assert one.model == other.model
+    for left, right in zip(one.recordings, other.recordings, strict=True):
+        for name in ("time", "pose", "pusher"):
+            np.testing.assert_array_equal(getattr(left, name), getattr(right, name))
+        assert left.conditions == right.conditions
 
 
-def test_a_table_says_which_pushes_were_meant_to_be_alike(tmp_path):
+def test_a_table_states_which_pushes_were_planned_alike(tmp_path):
     rows = [{}, {"t": 0.0}, {"vel_mm_s": 20.0}, {"surface": "plywood"}]
-    log = read_log(write_csv(tmp_path / "t.csv", *rows))
-    assert log.plan is not None
-    assert log.plan[0] == log.plan[2] == ("abs", 0.025, -0.349)
-    assert len(set(log.plan)) == 3
-    assert (
-        read_log(write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW])).plan is None
-    )
+    found = plans(read_log(write_csv(tmp_path / "t.csv", *rows)))
+    assert found[0] == found[2]
+    assert len(set(found)) == 3
+    log = read_log(write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW]))
+    assert plans(log) == [""]
 
 
 def test_a_table_is_read_in_si_units(tmp_path: Path):
     log = read_log(write_csv(tmp_path / "t.csv", {}, {"vel_mm_s": 20, "tip_y1": 0.03}))
-    assert log.size == 2
-    np.testing.assert_allclose(log.speed, [0.010, 0.020])
-    np.testing.assert_array_equal(log.before[0], [0.3, 0.0, 1.0])
-    np.testing.assert_array_equal(log.tip_after, [[0.2927, 0.0], [0.2927, 0.03]])
-    np.testing.assert_array_equal(log.published[1], [0.321, 0.012, 1.25])
+    assert [each.conditions.speed_mm_s for each in log.recordings] == [10, 20]
+    lasts = [each.time.tolist() for each in log.recordings]
+    assert lasts == [[0, pytest.approx(5.0)], [0, pytest.approx(2.5)]]
+    np.testing.assert_array_equal(poses(log, 0)[0], [0.3, 0.0, 1.0])
+    np.testing.assert_array_equal(tips(log, 1), [[0.2927, 0.0], [0.2927, 0.03]])
+    np.testing.assert_allclose(log.published[1], [0.321, 0.012, 1.25])
     assert log.model == "zhou-poly4"
 
 
@@ -94,30 +121,31 @@ def test_an_authors_log_reads_as_the_same_rows_of_the_table(
 ):
     with (recorded_pushes_folder / "ellip1_endpoints.csv").open(newline="") as file:
         found = [r for r in csv.DictReader(file) if r["surface"] == "plywood"]
-    rows = [r | {n: float(r[n]) for n in NUMBERS} for r in found]
+    rows = [r | {n: float(r[n]) for n in COLUMNS.numbers} for r in found]
     table = read_log(
         write_csv(tmp_path / "t.csv", *[{n: r[n] for n in ROW} for r in rows])
     )
     log = read_log(write_mat(tmp_path / "plywood_ellip1_poly4_v10.mat", rows))
-    assert log.size == 261
+    assert len(log.recordings) == 261
     assert_same(log, table)
 
 
 @pytest.mark.recorded
 def test_the_real_log_of_a_square_is_read_whole(recorded_pushes_folder: Path):
-    log = read_log(recorded_pushes_folder / "plywood_rect1_poly4_v10.mat")
-    assert log.size == 396
-    assert set(log.surface) == {"plywood"}
-    assert set(log.shape) == {"rect1"}
-    np.testing.assert_allclose(log.speed, 0.010)
-    np.testing.assert_allclose(
-        log.before[0], [0.34386552, -0.04300157, -1.17121293], atol=1e-8
-    )
-    np.testing.assert_allclose(log.after[0, 0], 0.31308118, atol=1e-8)
-    np.testing.assert_allclose(log.published[0, 2], -1.55485916, atol=1e-8)
-    stroke = np.linalg.norm(log.tip_after - log.tip_before, axis=1)
-    assert stroke.min() > 0.0494
-    assert stroke.max() < 0.0507
+    path = recorded_pushes_folder / "plywood_rect1_poly4_v10.mat"
+    table, model = read_mat(path, path.read_bytes(), Problems())
+    assert (table.rows, model) == (396, "poly4")
+    assert table.texts["surface"].names == ["plywood"]
+    assert table.texts["shape"].names == ["rect1"]
+    first = {name: values[0] for name, values in table.numbers.items()}
+    assert set(table.numbers["vel_mm_s"]) == {10.0}
+    assert first["obj_x0"] == pytest.approx(0.34386552, abs=1e-8)
+    assert first["obj_th0"] == pytest.approx(-1.17121293, abs=1e-8)
+    assert first["obj_x1"] == pytest.approx(0.31308118, abs=1e-8)
+    assert first["zhou_poly4_th1"] == pytest.approx(-1.55485916, abs=1e-8)
+    ends = [[table.numbers[f"tip_{axis}{end}"] for axis in "xy"] for end in (0, 1)]
+    stroke = np.hypot(*np.subtract(*ends))
+    assert 0.0494 < stroke.min() < stroke.max() < 0.0507
 
 
 def test_a_missing_file_says_where_the_pushes_come_from(tmp_path: Path):
@@ -135,23 +163,36 @@ def test_a_missing_column_is_named(tmp_path: Path, name: str):
 
 def test_a_column_that_is_there_twice_is_refused(tmp_path: Path):
     path = write_csv(tmp_path / "t.csv", {})
-    path.write_text(path.read_text().replace("obj_y0", "obj_x0"))
+    text = path.read_text().replace("surface,", "surface,obj_x0,")
+    path.write_text(text.replace("abs,", "abs,0.3,"))
     assert "column obj_x0 is there twice" in refusal(path)
 
 
 @pytest.mark.parametrize(
     ("row", "parts"),
     [
-        ({"obj_x1": "nan"}, ["row 3", "obj_x1 is nan", "finite"]),
-        ({"tip_y1": "-inf"}, ["row 3", "tip_y1 is -inf", "finite"]),
-        ({"obj_th0": "12.3.4"}, ["row 3", "obj_th0 is '12.3.4'", "no number"]),
-        ({"tip_x0": ""}, ["row 3", "tip_x0 is ''", "no number"]),
-        ({"vel_mm_s": 0}, ["row 3", "vel_mm_s is 0.0", "from 1 to 1000 mm/s"]),
-        ({"vel_mm_s": -10}, ["row 3", "vel_mm_s is -10.0"]),
-        ({"vel_mm_s": 0.01}, ["row 3", "vel_mm_s is 0.01"]),
-        ({"tip_x0": 242.7}, ["row 3", "tip_x0 is 242.7", "looks like millimetres"]),
-        ({"obj_th1": 57.3}, ["row 3", "obj_th1 is 57.3", "looks like degrees"]),
-        ({"surface": " "}, ["row 3", "surface is ''"]),
+        ({"obj_x1": "nan"}, ["row 3", "obj_x1 is 'nan'", "finite"]),
+        ({"tip_y1": "-inf"}, ["row 3", "tip_y1 is '-inf'", "finite"]),
+        ({"obj_th0": "12.3.4"}, ["row 3", "obj_th0 is '12.3.4'", "finite number"]),
+        ({"obj_x0": "\uff10.\uff13"}, ["row 3", "obj_x0 is '０.３'", "finite number"]),
+        ({"obj_x0": "0_3"}, ["row 3", "obj_x0 is '0_3'", "finite number"]),
+        ({"tip_x0": ""}, ["row 3", "tip_x0 is ''", "finite number"]),
+        ({"vel_mm_s": 0}, ["row 3", "vel_mm_s is 0;", "from 1 to 1000 mm/s"]),
+        ({"vel_mm_s": -10}, ["row 3", "vel_mm_s is -10;"]),
+        ({"vel_mm_s": 0.01}, ["row 3", "vel_mm_s is 0.01;"]),
+        ({"tip_x0": 242.7}, ["row 3", "tip_x0 is 242.7 (in millimetres?)"]),
+        ({"obj_th1": 57.3}, ["row 3", "obj_th1 is 57.3 (in degrees?)"]),
+        ({"surface": " "}, ["row 3", "surface is empty"]),
+        (
+            {"obj_x0": 1.3, "obj_x1": 1.32},
+            ["row 3", "'ellip1' moves by", "970 mm away"],
+        ),
+        ({"obj_x0": 1.3}, ["row 3", "'ellip1' moves by 980 mm", "pusher moves by 50"]),
+        (
+            {"obj_x1": 1.32},
+            ["row 3", "'ellip1' moves by 1020 mm", "check their places"],
+        ),
+        ({"obj_x0": 0.25}, ["row 3", "'ellip1' and the pusher overlap by", "radii"]),
     ],
 )
 def test_a_bad_value_is_named_with_its_row(tmp_path: Path, row: dict, parts: list[str]):
@@ -183,7 +224,7 @@ def test_no_rows_no_content_and_no_text_are_refused(tmp_path: Path):
     assert "empty" in refusal(empty)
     noise = tmp_path / "noise.csv"
     noise.write_bytes(np.random.default_rng(0).bytes(5000))
-    assert "no CSV text" in refusal(noise)
+    assert "not CSV text" in refusal(noise)
     noise.write_bytes(b"\0" * 5000)
     refusal(noise)
 
@@ -193,8 +234,8 @@ def test_a_table_without_a_last_line_break_is_read_with_a_warning(
 ):
     path = write_csv(tmp_path / "t.csv", {})
     path.write_bytes(path.read_bytes().rstrip())
-    assert read_log(path).size == 1
-    assert "last row" in caplog.text
+    assert len(read_log(path).recordings) == 1
+    assert "is it cut?" in caplog.text
 
 
 def test_a_log_cut_anywhere_is_refused(tmp_path: Path):
@@ -224,7 +265,7 @@ def test_a_log_with_changed_bytes_never_ends_in_another_error(tmp_path: Path):
 def test_random_bytes_are_no_log(tmp_path: Path):
     path = tmp_path / "abs_ellip1_poly4_v10.mat"
     path.write_bytes(np.random.default_rng(1).bytes(5000))
-    assert "damaged or no MATLAB file" in refusal(path)
+    assert "damaged or not a MATLAB file" in refusal(path)
 
 
 @pytest.mark.parametrize("field", FIELDS)
@@ -258,7 +299,8 @@ def test_a_log_with_wrong_sizes_kinds_or_values_is_refused(tmp_path: Path):
 def test_the_name_of_a_log_has_to_say_what_it_is(tmp_path: Path):
     assert "SURFACE_SHAPE_MODEL" in refusal(write_mat(tmp_path / "log.mat", [ROW]))
     path = tmp_path / "abs_ellip1_poly4_v10.mat"
-    assert read_log(write_mat(path, [ROW], shape_id="ellip1", vel=10)).size == 1
+    good = write_mat(path, [ROW], shape_id="ellip1", vel=10)
+    assert len(read_log(good).recordings) == 1
     assert "'rect1' inside" in refusal(write_mat(path, [ROW], shape_id="rect1"))
     assert "vel is '20'" in refusal(write_mat(path, [ROW], vel=20))
     cell = np.empty((1, 1), object)

@@ -1,8 +1,6 @@
 """The raw MIT Push dataset: files with every trap, and the motion that is known."""
 
-import fcntl
 import json
-import os
 import zipfile
 from collections import Counter
 from pathlib import Path
@@ -25,8 +23,8 @@ from datasets.raw_pushes import (
 )
 from datasets.stores import assert_same_files, contents
 from sainet.datasets.batch import to_batch
-from sainet.datasets.recorded import arrays, files
-from sainet.datasets.recorded.mitpush.raw import import_mitpush
+from sainet.datasets.recorded import archives, importing
+from sainet.datasets.recorded.raw import import_mitpush
 from sainet.runs.errors import BadInput, BadTable, MissingExtra, RunConflict
 
 WITHIN = 0.0017 + np.arange(1, 239) / 240  # s: steps that were recorded
@@ -97,8 +95,8 @@ def test_what_was_left_out_is_counted(imported):
     assert skipped(imported.path) == {
         "under 100 bytes": 1,
         "accelerated": 1,
-        "named unlike a push of this dataset": 1,
-        "shape rect1: no disk": 1,
+        "name differs from those of this dataset": 1,
+        "shape rect1: not a disk": 1,
     }
 
 
@@ -127,7 +125,7 @@ def test_chunks_do_not_change_what_is_stored(
     files = {name(rep=i): to_json(recording(0.1 + 0.1 * i)) for i in range(3)}
     path = pack(tmp_path / "a.zip", files)
     whole = import_mitpush(path, tmp_path / "whole").read(slice(None))
-    monkeypatch.setattr(arrays, "_CHUNK_SIZE", 2)
+    monkeypatch.setattr(importing, "_CHUNK_SIZE", 2)
     store = import_mitpush(path, tmp_path / "parts")
     assert store.info.chunk_size == 2
     parts = store.read(slice(None))
@@ -164,7 +162,7 @@ def test_damaged_hdf5_is_left_out(tmp_path: Path):
     files |= {name("h5", rep=i): whole[: len(whole) * i // 4] for i in (1, 2, 3)}
     path = pack(tmp_path / "ellip1_h5.zip", files)
     assert import_mitpush(path, tmp_path / "out").info.pushes == 1
-    assert skipped(tmp_path / "out") == {"damaged, or no recording of a push": 3}
+    assert skipped(tmp_path / "out") == {"damaged, or not a recording of a push": 3}
 
 
 def test_the_same_push_twice_counts_once(tmp_path: Path):
@@ -182,6 +180,10 @@ def stamps(key: str, rows: slice, change: float):
     return apply
 
 
+def inside(arrays: dict[str, np.ndarray]) -> None:
+    arrays["tip_pose"][:, 1] += 0.006
+
+
 def values(key: str, rows: slice, column: int, change: float):
     def apply(arrays: dict[str, np.ndarray]) -> None:
         arrays[key][rows, column] += change
@@ -192,24 +194,23 @@ def values(key: str, rows: slice, column: int, change: float):
 UNUSABLE = {
     "object_pose: the clock runs backwards": stamps("object_pose", slice(50, 52), -0.1),
     "tip_pose: the clock runs backwards": stamps("tip_pose", slice(9, None), -1.0),
-    "object_pose jumps": values("object_pose", slice(90, None), 1, 0.006),
-    "tip_pose jumps": values("tip_pose", slice(90, None), 2, -0.006),
-    "object_pose: the yaw jumps": values("object_pose", slice(90, None), 3, 0.6),
+    "the body jumps": values("object_pose", slice(90, None), 1, 0.006),
+    "the pusher jumps": values("tip_pose", slice(90, None), 2, -0.006),
+    "the angle jumps": values("object_pose", slice(90, None), 3, 0.6),
     "object_pose has a gap of more than 50 ms": stamps(
         "object_pose", slice(120, None), 0.2
     ),
-    "object_pose is out of the robot's reach": values("object_pose", slice(None), 1, 9),
-    "object_pose holds NaN, infinity or too many samples": values(
+    "an overlap at the start": inside,
+    "the place is out of range": values("object_pose", slice(None), 1, 9),
+    "object_pose contains NaN, infinity or too many samples": values(
         "object_pose", slice(3, 4), 1, np.nan
     ),
     "lasts less than a step, or its clocks share no time": stamps(
         "tip_pose", slice(None), 5.0
     ),
     "tip_pose is not N x 4 numbers": lambda a: a.update(tip_pose=a["tip_pose"][:, :3]),
-    "tip_pose has fewer than two samples": lambda a: a.update(
-        tip_pose=a["tip_pose"][:1]
-    ),
-    "damaged, or no recording of a push": lambda a: a.pop("object_pose"),
+    "fewer than two samples": lambda a: a.update(tip_pose=a["tip_pose"][:1]),
+    "damaged, or not a recording of a push": lambda a: a.pop("object_pose"),
 }
 
 
@@ -225,7 +226,7 @@ def test_every_unusable_push_is_named_and_counted(
     path = pack(tmp_path / "ellip1_json.zip", whole, zipfile.ZIP_STORED)
     assert import_mitpush(path, tmp_path / "out").info.pushes == 1
     counts = dict.fromkeys(UNUSABLE, 1)
-    counts["damaged, or no recording of a push"] += len(broken)
+    counts["damaged, or not a recording of a push"] += len(broken)
     assert skipped(tmp_path / "out") == counts
     for member in (*files, *broken):
         assert f"{member}' is left out: " in caplog.text
@@ -281,7 +282,7 @@ HOSTILE = {
     "inner parent": (member("a/../../b.json"), "leaves its folder"),
     "absolute": (member("/etc/passwd"), "'/etc/passwd' leaves its folder"),
     "drive": (member("C:/x.json"), "leaves its folder"),
-    "backslash": (member("a\\b.json"), "no name of a file"),
+    "backslash": (member("a\\b.json"), "not a file name"),
     "line break": (member("../a\nb"), r"\\nb"),
     "bomb": (lambda p: pack(p, {name(): bytes(9 << 20)}), "packed more than 100 times"),
     "large": (
@@ -290,7 +291,7 @@ HOSTILE = {
     ),
     "bzip2": (lambda p: pack(p, good(), zipfile.ZIP_BZIP2), "unusual way"),
     "no zip": (lambda p: p.write_text("hello"), "is damaged"),
-    "empty": (lambda p: pack(p, {}), "holds no push to use"),
+    "empty": (lambda p: pack(p, {}), "has no push that can be used"),
     "no disks": (
         lambda p: pack(p, {name(shape="hex"): b"x"}),
         "sainet models disks.*hex",
@@ -312,7 +313,7 @@ def test_hostile_archives_give_one_line_and_leave_nothing(tmp_path: Path, case: 
 
 def test_all_files_together_have_a_cap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = pack(tmp_path / "a.zip", {name(rep=i): to_json(recording()) for i in (1, 2)})
-    monkeypatch.setattr(files, "LARGEST_SUM", int(1.5 * len(to_json(recording()))))
+    monkeypatch.setattr(archives, "LARGEST_SUM", int(1.5 * len(to_json(recording()))))
     with pytest.raises(BadTable, match="_rep=0002.json' is too large"):
         import_mitpush(path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -321,7 +322,7 @@ def test_all_files_together_have_a_cap(tmp_path: Path, monkeypatch: pytest.Monke
 @pytest.mark.parametrize("path", ["nowhere", "nowhere.zip", "pushes.csv"])
 def test_a_path_that_is_neither_is_refused(tmp_path: Path, path: str):
     (tmp_path / "pushes.csv").write_text("t")
-    with pytest.raises(BadTable, match="is no .zip and no folder"):
+    with pytest.raises(BadTable, match="neither a .zip nor a folder"):
         import_mitpush(tmp_path / path, tmp_path / "out")
 
 
@@ -344,25 +345,18 @@ def test_the_same_input_gives_the_same_bytes_and_other_input_is_refused(
 def test_an_import_does_not_read_what_it_wrote(tmp_path: Path):
     pack(tmp_path / "ellip1_json.zip", good())
     out = tmp_path / "runs" / "mit"
-    killed = out.with_name(".mit.0.partial")
-    killed.mkdir(parents=True)
-    (killed / "config.json").write_text("{}")
     for _ in range(2):
         import_mitpush(tmp_path, out)
     assert skipped(out) == {}
 
 
-def test_what_killed_imports_left_is_removed_and_what_lives_is_not(tmp_path: Path):
-    path = pack(tmp_path / "ellip1_json.zip", good())
-    killed, alive = (tmp_path / f".out.{number}.partial" for number in range(2))
-    killed.mkdir()
-    (killed / "config.json").write_text("{}")
-    alive.mkdir()
-    descriptor = os.open(alive, os.O_RDONLY)
-    fcntl.flock(descriptor, fcntl.LOCK_EX)
-    import_mitpush(path, tmp_path / "out")
-    os.close(descriptor)
-    assert {each.name for each in tmp_path.iterdir()} == {path.name, alive.name, "out"}
+def test_a_disk_far_from_the_pusher_is_left_out(tmp_path: Path):
+    def away(arrays: dict[str, np.ndarray]) -> None:
+        arrays["tip_pose"][:, 2] += 1.0
+
+    path = pack(tmp_path / "a.zip", good() | {name(rep=1): changed(away)})
+    assert import_mitpush(path, tmp_path / "out").info.pushes == 1
+    assert skipped(tmp_path / "out") == {"a disk moves untouched": 1}
 
 
 def test_a_friction_that_cannot_be_is_refused(tmp_path: Path):

@@ -1,6 +1,8 @@
 """Somebody's own pushes as a store: what is kept, and what is refused with its row."""
 
 import json
+import os
+import re
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,8 +22,9 @@ from datasets.own_pushes import (
     write,
 )
 from datasets.stores import assert_same_files, contents
+from sainet.cli.entry import run
 from sainet.datasets.batch import to_batch
-from sainet.datasets.recorded.table.importer import import_table
+from sainet.datasets.recorded.own import import_table
 from sainet.runs.errors import BadInput, BadTable, MissingExtra, RunConflict
 from support import require
 
@@ -136,30 +139,38 @@ def swapped(one: int, other: int) -> str:
     return to_csv(table)
 
 
-def renamed(old: str, new: str) -> str:
-    return to_csv(rows()).replace(old, new, 1)
-
-
 def in_groups() -> str:
     return to_csv([[*r, k > 7] for k, r in enumerate(rows())], GROUPED)
 
 
 HOSTILE = {
-    "empty": ("", "is empty"),
+    "empty": ("", "pushes.csv: empty"),
     "header alone": (to_csv([]), "has no rows"),
-    "no text": (b"\xff\xfe\0", "is no CSV text"),
-    "missing column": (renamed(",angle", ""), "row 1: column angle is missing"),
-    "column twice": (renamed("angle", "x"), "row 1: column x is there twice"),
+    "no text": (b"\xff\xfe\0", "not CSV text"),
+    "missing column": (
+        to_csv([[*r[:5], *r[6:]] for r in rows()], [*HEADER[:5], *HEADER[6:]]),
+        "row 1: column angle is missing",
+    ),
+    "column twice": (
+        to_csv([[*r, 0] for r in rows()], [*HEADER, "x"]),
+        "row 1: column x is there twice",
+    ),
     "unknown column": (
         to_csv([[*r, 0] for r in rows()], [*HEADER, "z"]),
-        "row 1: column 'z' is unknown",
+        "row 1: column z is unknown",
     ),
     "cut row": (to_csv(rows())[:-30], "row 203: has .* fields, not 8"),
-    "no number": (change(9, "y", "left"), "row 9: y is 'left', which is no number"),
-    "underscore": (change(9, "x", "0_2"), "row 9: x is '0_2', which is no number"),
-    "empty field": (change(9, "y", ""), "row 9: y is '', which is no number"),
-    "nan": (change(10, "x", "nan"), "row 10: x is nan; it must be finite"),
-    "infinite": (change(10, "time", "1e999"), "row 10: time is inf"),
+    "no number": (
+        change(9, "y", "left"),
+        "row 9: y is 'left'; it must be a finite number",
+    ),
+    "underscore": (
+        change(9, "x", "0_2"),
+        "row 9: x is '0_2'; it must be a finite number",
+    ),
+    "empty field": (change(9, "y", ""), "row 9: y is ''; it must be a finite number"),
+    "nan": (change(10, "x", "nan"), "row 10: x is 'nan'; it must be a finite number"),
+    "infinite": (change(10, "time", "1e999"), "row 10: time is '1e999'"),
     "no push": (change(4, "push", " "), "row 4: push is empty"),
     "unknown body": (
         change(7, "body", "mid"),
@@ -169,8 +180,8 @@ HOSTILE = {
         swapped(20, 22),
         "row 22: push '1': .* comes after",
     ),
-    "repeated": (change(22, "time", 0.036), "row 22: .* is there twice"),
-    "duplicate row": (to_csv([*rows(), rows()[-1]]), "row 204: .* is there twice"),
+    "repeated": (change(22, "time", 0.036), "row 22: .* appears twice"),
+    "duplicate row": (to_csv([*rows(), rows()[-1]]), "row 204: .* appears twice"),
     "body missing": (
         to_csv(rows() + [r for r in rows("b") if r[2] == "far"]),
         "row 204: push 'b': body 'near' is missing",
@@ -189,15 +200,21 @@ HOSTILE = {
     ),
     "jump": (change(100, "x", 0.25), "row 100: push '1': the body jumps"),
     "jump of the angle": (change(100, "angle", 2.5), "row 100: .*: the angle jumps"),
-    "millimetres": (each("y", 1000), "y is 100: looks like millimetres; .* in metres"),
+    "millimetres": (
+        each("y", 1000),
+        "y is 100 .in millimetres.*; it must be from -5 to 5 m",
+    ),
     "pusher in millimetres": (
         each("pusher_x", 1000),
-        "pusher_x is .*: looks like millimetres",
+        "pusher_x is .*in millimetres",
     ),
-    "degrees": (each("angle", 57.3), "angle is .*: looks like degrees; .* in radians"),
-    "milliseconds": (each("time", 1000), "looks like milliseconds; .* in seconds"),
-    "one sample": (to_csv(rows()[:2]), "row 3: push '1': body 'far' has one sample"),
-    "too short": (to_csv(rows(rate=5000)[:4]), "push '1' lasts less than a step"),
+    "degrees": (each("angle", 57.3), "angle is .*in degrees.*; it must be .* rad"),
+    "milliseconds": (
+        each("time", 1000),
+        "lasts 400 s .in milliseconds.*; .* in seconds",
+    ),
+    "one sample": (to_csv(rows()[:2]), "row 3: push '1': has fewer than two samples"),
+    "too short": (to_csv(rows(rate=5000)[:4]), "push '1': lasts less than a step"),
     "groups": (in_groups(), "row .*: push '1' is in several groups"),
 }
 
@@ -220,25 +237,28 @@ def test_degrees_of_small_turns_are_recognised_by_what_moves(tmp_path: Path):
     table = rows(duration=1.0)
     for k, row in enumerate(table):
         row[5] = 10 * k / len(table)
-    with pytest.raises(BadTable, match=r"row 3: .* changes by .* looks like degrees"):
+    with pytest.raises(BadTable, match=r"row 3: .* changes by .* .in degrees"):
         import_table(*write(tmp_path, to_csv(table)), tmp_path / "out")
 
 
 BAD_PROPERTIES = {
-    "no toml": ("[bodies", "is no TOML"),
-    "no bodies": ("[pusher]\nradius=1\n", "'bodies' is missing"),
-    "no pusher": (PROPERTIES.replace("pusher", "bodies.p"), "'pusher' is missing"),
-    "no mass": (PROPERTIES.replace("mass = 1.0", ""), r"\[bodies.'far'\] has no mass"),
+    "no toml": ("[bodies", "not TOML"),
+    "no bodies": ("[pusher]\nradius=1\n", r"\[bodies\] is missing"),
+    "no pusher": (PROPERTIES.replace("pusher", "bodies.p"), r"\[pusher\] is missing"),
+    "no mass": (
+        PROPERTIES.replace("mass = 1.0", ""),
+        r"\[bodies.'far'\] mass is missing",
+    ),
     "negative": (
         PROPERTIES.replace("1.0", "-1.0"),
-        "mass is -1.0; it must",
+        "mass is -1; it must be from 0.001 to 100 kg",
     ),
-    "huge": (PROPERTIES.replace("1.0", "9" * 400), "mass is 9+; it must be positive"),
-    "text": (PROPERTIES.replace("1.0", "'1'"), "mass is '1'; it must be positive"),
-    "truth": (PROPERTIES.replace("1.0", "true"), "mass is True; it must be positive"),
-    "nan": (PROPERTIES.replace("0.05", "nan"), "radius is nan; it must be positive"),
-    "millimetres": (PROPERTIES.replace("0.05", "52.5"), "looks like millimetres"),
-    "grams": (PROPERTIES.replace("1.0", "896"), "looks like grams"),
+    "huge": (PROPERTIES.replace("1.0", "9" * 400), "mass is inf .*it must be from"),
+    "text": (PROPERTIES.replace("1.0", "'1'"), "mass is '1'; it must be from"),
+    "truth": (PROPERTIES.replace("1.0", "true"), "mass is True; it must be from"),
+    "nan": (PROPERTIES.replace("0.05", "nan"), "radius is nan; it must be from"),
+    "millimetres": (PROPERTIES.replace("0.05", "52.5"), "in millimetres"),
+    "grams": (PROPERTIES.replace("1.0", "896"), "in grams"),
     "unknown field": (
         PROPERTIES.replace("mass", "weight", 1),
         "unknown field 'weight'",
@@ -257,9 +277,86 @@ def test_bad_properties_are_named(tmp_path: Path, case: str):
     table, bodies = write(tmp_path, to_csv(rows()), text)
     with pytest.raises(BadTable, match=wanted) as caught:
         import_table(table, bodies, tmp_path / "out")
-    assert str(caught.value).startswith(f"{bodies}: ")
-    assert len(str(caught.value).splitlines()) == 1
+    for line in str(caught.value).splitlines():
+        assert line.startswith(f"{bodies}: ")
     assert not (tmp_path / "out").exists()
+
+
+def typical_mistakes() -> tuple[str, str]:
+    """A table and properties with the mistakes of a first import."""
+    table = [[*row[:5], np.rad2deg(row[5]), *row[6:]] for row in rows("a")]
+    table += [[*row[:3], 1000 * row[3], *row[4:]] for row in rows("b")]
+    table += [[row[0], 1000 * row[1], *row[2:]] for row in rows("c")]
+    table += rows("d")[::-1]
+    table += rows("e")
+    table[-5][4] = "nan"
+    text = to_csv(table).replace(",", ";")
+    weighed = PROPERTIES.replace("mass = 1.0", "mass = 896").replace("0.005", "5")
+    return text, weighed
+
+
+def test_one_run_reports_every_kind_of_typical_mistake(tmp_path: Path, capfd):
+    text, properties = typical_mistakes()
+    table, bodies = write(tmp_path, text, properties)
+    words = ["import", "table", str(table), "--properties", str(bodies)]
+    assert run([*words, "--out", str(tmp_path / "out")]) == 2
+    lines = capfd.readouterr().err.splitlines()
+    wanted = [
+        r"pushes.csv: row 1: semicolons separate the columns; use commas",
+        r"pushes.csv: row \d+: y is 'nan'; it must be a finite number",
+        r"bodies.toml: \[bodies.'far'\] mass is 896 \(in grams\?\)",
+        r"bodies.toml: \[pusher\] radius is 5 \(in millimetres\?\)",
+        r"pushes.csv: row \d+: x is .* \(in millimetres\?\)",
+        r"pushes.csv: row \d+: angle is .* \(in degrees\?\)",
+        r"pushes.csv: row \d+: push 'c': lasts 400 s \(in milliseconds\?\)",
+        r"pushes.csv: row \d+: push 'd': body 'far': time .* sort the times",
+    ]
+    assert len(lines) == len(wanted)
+    for line, pattern in zip(lines, wanted, strict=True):
+        assert line.startswith(f"sainet: {tmp_path}/")
+        assert re.search(pattern, line)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_misnamed_column_is_reported_with_the_units_of_the_others(tmp_path: Path):
+    text = each("y", 1000).replace("angle", "angel")
+    with pytest.raises(BadTable) as caught:
+        import_table(*write(tmp_path, text), tmp_path / "out")
+    missing, unknown, millimetres = caught.value.problems
+    assert "column angle (is it 'angel'?) is missing" in missing
+    assert "column angel is unknown" in unknown
+    assert "y is 100 (in millimetres?)" in millimetres
+
+
+def test_more_than_eight_kinds_are_counted(tmp_path: Path):
+    text, properties = typical_mistakes()
+    properties = properties.replace("table = 0.3", "table = -1\nslope = 1")
+    with pytest.raises(BadTable) as caught:
+        import_table(*write(tmp_path, text, properties), tmp_path / "out")
+    assert len(caught.value.problems) == 8
+    assert caught.value.problems[-1] == "and 3 other kinds of problems."
+
+
+def test_a_disk_far_from_the_pusher_is_refused(tmp_path: Path):
+    table = rows()
+    for row in table:
+        row[7] += 1.0
+    with pytest.raises(
+        BadTable, match=r"row 3: push '1': 'near' moves .* untouched|away"
+    ):
+        import_table(*write(tmp_path, to_csv(table)), tmp_path / "out")
+
+
+def test_pipes_and_devices_are_refused(tmp_path: Path):
+    _, bodies = write(tmp_path, to_csv(rows()))
+    os.mkfifo(tmp_path / "pipe.csv")
+    os.mkfifo(tmp_path / "pipe.toml")
+    (tmp_path / "zero.csv").symlink_to("/dev/zero")
+    for path in ("pipe.csv", "zero.csv"):
+        with pytest.raises(BadTable, match="not a regular file"):
+            import_table(tmp_path / path, bodies, tmp_path / "out")
+    with pytest.raises(BadTable, match="pipe.toml: not a regular file"):
+        import_table(tmp_path / "pushes.csv", tmp_path / "pipe.toml", tmp_path / "out")
 
 
 @pytest.mark.parametrize("radius", ["0.057", "0.06"])
@@ -267,7 +364,7 @@ def test_disks_that_overlap_have_a_wrong_radius(tmp_path: Path, radius: str):
     """The disks are 100 mm apart, their radii sum up to 90."""
     larger = PROPERTIES.replace("0.05\n", f"{float(radius) + 0.01}\n")
     table, bodies = write(tmp_path, to_csv(rows()), larger)
-    with pytest.raises(BadTable, match=r"'far' and 'near' overlap by .* their radii"):
+    with pytest.raises(BadTable, match=r"'far' and 'near' overlap by .* radii"):
         import_table(table, bodies, tmp_path / "out")
 
 
@@ -276,7 +373,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path):
     for path in (tmp_path / "no.csv", tmp_path, tmp_path / "no.parquet"):
         with pytest.raises(BadTable, match=str(path)):
             import_table(path, bodies, tmp_path / "out")
-    with pytest.raises(BadTable, match="cannot be read"):
+    with pytest.raises(BadTable, match="no.toml: no such file"):
         import_table(table, tmp_path / "no.toml", tmp_path / "out")
     with pytest.raises(BadInput, match="`contact_friction` is -1"):
         import_table(table, bodies, tmp_path / "out", contact_friction=-1)
@@ -313,23 +410,23 @@ def without(column: int, row: int = 4) -> list[list]:
 
 
 HOSTILE_PARQUET = {
-    "damaged": (lambda: to_parquet(rows())[:-40], "is damaged or no Parquet file"),
-    "empty": (lambda: b"", "is damaged or no Parquet file"),
-    "no rows": (lambda: to_parquet([]), "column .* holds null|has no rows"),
+    "damaged": (lambda: to_parquet(rows())[:-40], "damaged or not a Parquet file"),
+    "empty": (lambda: b"", "damaged or not a Parquet file"),
+    "no rows": (lambda: to_parquet([]), "column .* contains null|has no rows"),
     "missing": (lambda: to_parquet(rows(), HEADER[:-1]), "column pusher_y is missing"),
     "unknown": (
         lambda: to_parquet([[*r, 0] for r in rows()], [*HEADER, "__index_level_0__"]),
-        "'__index_level_0__' is unknown",
+        "__index_level_0__ is unknown",
     ),
     "null": (lambda: to_parquet(without(3)), "row 4: x is nan"),
     "no push": (lambda: to_parquet(without(0)), "row 4: push is empty"),
     "text": (
         lambda: to_parquet([[*r[:3], str(r[3]), *r[4:]] for r in rows()]),
-        "column x holds string, not numbers",
+        "column x contains string, not numbers",
     ),
     "lists": (
         lambda: to_parquet([[[1], *r[1:]] for r in rows()]),
-        "column push holds list.*, not text",
+        "column push contains list.*, not text",
     ),
 }
 

@@ -27,7 +27,7 @@ from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.split import Split
 from sainet.cli.train import Train, going_on
-from sainet.runs.errors import BadInput, SainetError
+from sainet.runs.errors import BadInput, BadTable, SainetError
 from sainet.runs.interrupts import remembered_interrupts
 
 _COMMANDS = {
@@ -106,7 +106,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
             finish(command.run(), command.output)
     except SainetError as error:
         command_type = _COMMANDS.get(words[0] if words else "")
-        print(f"sainet: {message(error, command_type)}", file=sys.stderr)
+        table = isinstance(error, BadTable)
+        for each in map(BadTable, error.problems) if table else [error]:
+            print(f"sainet: {message(each, command_type)}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
         goes_on = isinstance(command, _GOES_ON)

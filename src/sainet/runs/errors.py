@@ -27,7 +27,12 @@ class BadStore(BadInput):
 
 
 class BadTable(BadInput):
-    """Somebody else's file of recorded pushes that cannot be read."""
+    """Files of recorded pushes that cannot be used; each problem is one line."""
+
+    def __init__(self, *problems: str) -> None:
+        """Keep the problems, the first of each kind; each line names its file."""
+        super().__init__("\n".join(problems))
+        self.problems = problems
 
 
 class BadCheckpoint(BadInput):

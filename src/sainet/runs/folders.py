@@ -61,7 +61,7 @@ def open_run(
             return folder
         raise
     for leftover in path.glob(".*.partial"):
-        if not leftover.is_dir():  # of an import into this folder, maybe alive
+        if not leftover.is_dir():
             leftover.unlink(missing_ok=True)
     if not (path / MANIFEST).exists():
         write_json(path / MANIFEST, manifest(devices))

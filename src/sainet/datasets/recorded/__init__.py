@@ -1,1 +1,1 @@
-"""Recorded pushes of real robots, read into stores like any other."""
+"""Recorded pushes: readers of three formats, one resampler, one writer of stores."""

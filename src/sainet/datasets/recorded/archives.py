@@ -1,4 +1,4 @@
-"""Files that are read whole; those of zips under caps, in memory, never extracted."""
+"""Files in folders and zips; zips are read in memory under caps, never extracted."""
 
 import re
 import zipfile
@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from sainet.runs.documents import readable
+from sainet.runs.documents import read_file, readable
 from sainet.runs.errors import BadTable
 
 LARGEST_FILE = 16 << 20  # bytes
@@ -20,7 +20,7 @@ _LONGEST_NAME = 200  # characters in a message
 
 @dataclass(frozen=True)
 class ArchivedFile:
-    """A file that may be read: one of a zip, or one that stands by itself."""
+    """A file of a folder or a member of a zip."""
 
     path: Path  # of the zip, or of the file
     member: str | None  # the name within the zip
@@ -37,37 +37,23 @@ class ArchivedFile:
         return str(self.path) + (f": {_shown(self.member)}" if self.member else "")
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return what a file holds.
-
-    Raises:
-        BadTable: it cannot be read.
-    """
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise BadTable(
-            f"{path}: cannot be read ({error.strerror}); check path and permissions."
-        ) from None
-
-
 def list_files(path: Path) -> list[ArchivedFile]:
     """Return the files of a zip, or of a folder and the zips in it, in a fixed order.
 
     Raises:
-        BadTable: there is no such file or folder, or a zip is damaged or hostile.
+        BadTable: the path does not exist, or a zip is damaged or hostile.
     """
     with readable(path, BadTable):
         if path.is_dir():
             found = sorted(file for file in path.rglob("*") if file.is_file())
             return [each for file in found for each in _list_file(file)]
         if path.suffix.lower() != ".zip" or not path.is_file():
-            raise BadTable(f"{path}: is no .zip and no folder; give one of them.")
+            raise BadTable(f"{path}: neither a .zip nor a folder; give one of them.")
         return _list_file(path)
 
 
 def read_files(files: Sequence[ArchivedFile]) -> Iterator[tuple[ArchivedFile, bytes]]:
-    """Yield each file and what it holds, one at a time.
+    """Yield each file and its content, one at a time.
 
     Raises:
         BadTable: a file is too large, packed too densely, encrypted or damaged.
@@ -78,7 +64,7 @@ def read_files(files: Sequence[ArchivedFile]) -> Iterator[tuple[ArchivedFile, by
     with ExitStack() as stack:
         zips: dict[Path, zipfile.ZipFile] = {}
         for file in files:
-            with _told(file):
+            with _reported(file):
                 if file.member and file.path not in zips:
                     zips[file.path] = stack.enter_context(zipfile.ZipFile(file.path))
                 data = _read(file, zips.get(file.path))
@@ -90,10 +76,10 @@ def read_files(files: Sequence[ArchivedFile]) -> Iterator[tuple[ArchivedFile, by
 
 def _list_file(path: Path) -> list[ArchivedFile]:
     if path.suffix.lower() != ".zip":
-        with _told(path):
+        with _reported(path):
             size = path.stat().st_size
         return [ArchivedFile(path, None, size, size)]
-    with _told(path), zipfile.ZipFile(path) as archive:
+    with _reported(path), zipfile.ZipFile(path) as archive:
         return [
             ArchivedFile(path, info.filename, info.file_size, info.compress_size)
             for info in archive.infolist()
@@ -102,13 +88,13 @@ def _list_file(path: Path) -> list[ArchivedFile]:
 
 
 def _is_plain(path: Path, info: zipfile.ZipInfo) -> bool:
-    """Whether a member is a file; one that would leave the folder is refused."""
-    name = info.orig_filename  # what stands in the zip, not what Python made of it
+    """Return whether a member is a file; refuse one that would leave the folder."""
+    name = info.orig_filename  # as in the zip; Python changes `filename`
     folders = name.split("/")
     if name.startswith("/") or ".." in folders or _DRIVE.match(name):
         raise BadTable(f"{path}: {_shown(name)} leaves its folder; do not trust this.")
     if not name or "\\" in name or "\0" in name:
-        raise BadTable(f"{path}: {_shown(name)} is no name of a file; pack it again.")
+        raise BadTable(f"{path}: {_shown(name)} is not a file name; pack it again.")
     if info.flag_bits & _ENCRYPTED:
         raise BadTable(f"{path}: {_shown(name)} is encrypted; give it unlocked.")
     return not info.is_dir()
@@ -119,8 +105,8 @@ def _check(file: ArchivedFile) -> None:
         raise _too_large(file)
     if file.size > DENSEST * max(file.packed_size, 1):
         raise BadTable(
-            f"{file} is packed more than {DENSEST} times; no recording is: do not "
-            "trust it."
+            f"{file} is packed more than {DENSEST} times, unlike recordings; "
+            "do not trust it."
         )
 
 
@@ -132,22 +118,20 @@ def _too_large(file: ArchivedFile) -> BadTable:
 
 
 def _read(file: ArchivedFile, archive: zipfile.ZipFile | None) -> bytes:
-    """Read no more than a byte over what was declared."""
-    most = file.size + 1
+    """Read at most one byte more than was declared."""
     if archive is None or file.member is None:
-        with file.path.open("rb") as stream:
-            return stream.read(most)
+        return read_file(file.path, most=file.size, error=BadTable)
     info = archive.getinfo(file.member)
-    # Python's other unpackers may make any amount out of a few bytes at once.
+    # Python's other unpackers may return any amount at once for a few bytes.
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise BadTable(f"{file} is packed in an unusual way; pack it again.")
     with archive.open(info) as stream:
-        return stream.read(most)
+        return stream.read(file.size + 1)
 
 
 @contextmanager
-def _told(source: object) -> Iterator[None]:
-    """Say of any damage what is damaged, in one line."""
+def _reported(source: object) -> Iterator[None]:
+    """Raise `BadTable` naming the source for any error."""
     try:
         yield
     except BadTable:
@@ -155,12 +139,12 @@ def _told(source: object) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or _shown(str(error))
         raise BadTable(f"{source}: cannot be read ({reason}).") from None
-    # Of a damaged zip Python's reader raises whatever it stumbles over.
+    # Python's reader raises arbitrary exceptions on damaged zips.
     except Exception as error:
         reason = _shown(str(error) or type(error).__name__)
-        raise BadTable(f"{source}: is damaged ({reason}); fetch it again.") from None
+        raise BadTable(f"{source}: is damaged ({reason}); download it again.") from None
 
 
 def _shown(name: str) -> str:
-    """A name from a hostile zip on one line."""
+    """Return a name from a hostile zip on one line."""
     return repr(name[:_LONGEST_NAME])

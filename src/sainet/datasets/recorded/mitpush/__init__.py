@@ -1,1 +1,0 @@
-"""The MIT Push dataset: pushes known at their ends, and raw recordings."""

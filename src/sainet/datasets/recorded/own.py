@@ -1,0 +1,256 @@
+"""A table of own recorded pushes: one row for each push, time and body."""
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sainet.datasets.recorded.checks import (
+    ANGLE,
+    PLACE,
+    clock_problems,
+    first_fall,
+    recording_problems,
+)
+from sainet.datasets.recorded.importing import import_pushes
+from sainet.datasets.recorded.properties import Properties, read_properties
+from sainet.datasets.recorded.resample import resample
+from sainet.datasets.recorded.tables import (
+    SHOWN,
+    Columns,
+    Problems,
+    Table,
+    read_bytes,
+    read_csv,
+)
+from sainet.datasets.store import Store
+from sainet.runs.documents import content_hash
+from sainet.scenes.recording import Conditions, Recording
+
+_log = logging.getLogger(__name__)
+_PLACES = ("x", "y", "pusher_x", "pusher_y")
+_SAME_PLACE = 1e-6  # m
+COLUMNS = Columns(
+    texts=("push", "body"),
+    optional=("group",),
+    numbers=("time", "x", "y", "angle", "pusher_x", "pusher_y"),
+    note=" Columns: push, body, time (s), x, y, pusher_x, pusher_y (m), angle (rad), "
+    "optionally group.",
+)
+
+
+def import_table(
+    path: Path,
+    properties: Path,
+    out: Path,
+    *,
+    contact_friction: float | None = None,
+) -> Store:
+    """Make a store of a table with one row for each push, time and body.
+
+    Args:
+        path: a .csv or .parquet file; `docs/importing.md` describes its columns.
+        properties: TOML file of masses, radii and frictions.
+        out: run folder.
+        contact_friction: of two bodies, and of pusher and body; replaces the value of
+            the properties.
+
+    Raises:
+        BadTable: with file, row (line of the file, from 1) and remedy; the first
+            problem of each kind, one a line.
+        BadSetting: the friction is out of range.
+        MissingExtra: the table is Parquet, and pyarrow is not installed.
+        RunConflict: the folder holds something else.
+        BadInput: the disk is full.
+    """
+    path, problems = Path(path), Problems()
+    data = read_bytes(path, ".csv", ".parquet")
+    table = _read(path, data, problems)
+    known = read_properties(Path(properties), contact_friction, problems)
+    bodies = _present(table, known, Path(properties), problems)
+    recordings = list(_recordings(table, bodies, problems)) if bodies else []
+    problems.raise_any()
+    assert bodies is not None
+    return import_pushes(
+        out,
+        {
+            "command": "import table",
+            "source": path.name,
+            "source_sha256": content_hash(data),
+        },
+        [resample(recording) for recording in recordings],
+        bodies,
+    )
+
+
+def _read(path: Path, data: bytes, problems: Problems) -> Table:
+    if path.suffix.lower() == ".parquet":
+        from sainet.datasets.recorded.parquet import read_parquet
+
+        return read_parquet(path, data, COLUMNS, problems)
+    return read_csv(path, data, COLUMNS, problems)
+
+
+def _present(
+    table: Table, known: Properties, path: Path, problems: Problems
+) -> Properties | None:
+    """Return the properties of the bodies of the table, None if some have none."""
+    if "body" not in table.texts or not known.bodies:
+        return None
+    body = table.texts["body"]
+    for code, name in enumerate(body.names):
+        if name and name not in known.bodies:
+            row = int(np.argmax(body.code == code))
+            problems.add(
+                "unknown body",
+                f"{table.where(row)}: body {name[:SHOWN]!r} has no properties; add "
+                f"[bodies.NAME] to {path}.",
+            )
+    if not set(body.names) <= {*known.bodies, ""}:
+        return None
+    kept = [index for index, name in enumerate(known.bodies) if name in body.names]
+    for name in sorted(set(known.bodies) - set(body.names)):
+        _log.warning("%s: body %r is in no push of %s", path, name, table.path)
+    return replace(
+        known,
+        bodies=tuple(known.bodies[index] for index in kept),
+        mass=tuple(known.mass[index] for index in kept),
+        radius=tuple(known.radius[index] for index in kept),
+    )
+
+
+def _recordings(
+    table: Table, properties: Properties, problems: Problems
+) -> Iterator[Recording]:
+    """Yield the pushes of a table in the order in which they first appear.
+
+    Rows of different pushes and bodies may be in any order; times of one body in one
+    push must rise. Pushes with a problem are left out.
+    """
+    table.check(problems, PLACE, *_PLACES)
+    table.check(problems, ANGLE, "angle")
+    if not table.is_whole:
+        return  # what follows would only repeat the problems of the header and rows
+    units_fit = not ({PLACE.name, ANGLE.name} & problems.kinds)
+    for push in _by_push(table, properties):
+        recording = push.to_recording(problems) if push.is_sound(problems) else None
+        if recording is None:
+            continue
+        find = recording_problems(recording, properties) if units_fit else None
+        for problem in find or clock_problems(recording):
+            row = push.rows[problem.body][problem.sample]
+            line = f"{table.where(row)}: {push.name}: {problem.text}."
+            problems.add(problem.kind, line)
+            break  # the others may follow from the first
+        else:
+            yield recording
+
+
+def _by_push(table: Table, properties: Properties) -> Iterator["_Push"]:
+    push, body = table.texts["push"], table.texts["body"]
+    order = np.argsort(push.code, kind="stable")
+    first = np.searchsorted(push.code[order], np.arange(len(push.names)))
+    for code, rows in enumerate(np.split(order, first[1:])):
+        own = [rows[body.code[rows] == body.names.index(n)] for n in properties.bodies]
+        name = f"push {push.names[code][:SHOWN]!r}"
+        yield _Push(table, name, properties.bodies, own)
+
+
+@dataclass(frozen=True)
+class _Push:
+    """Rows of one push."""
+
+    table: Table
+    name: str
+    bodies: tuple[str, ...]
+    rows: list[Int[np.ndarray, " _"]]  # of each body
+
+    def column(self, name: str, body: int) -> Float[np.ndarray, " sample"]:
+        return self.table.numbers[name][self.rows[body]]
+
+    def pusher(self, body: int) -> Float[np.ndarray, "sample 2"]:
+        return np.column_stack([self.column(f"pusher_{axis}", body) for axis in "xy"])
+
+    def is_sound(self, problems: Problems) -> bool:
+        """Return whether all bodies have the same rising times and the same pusher."""
+        numbers = (self.column(n, b) for n in COLUMNS.numbers for b in self._indices)
+        if not all(np.isfinite(values).all() for values in numbers):
+            return False  # each of these values is a problem already
+        first = next(body for body in self._indices if len(self.rows[body]))
+        for body in self._indices:
+            found = self._problem(first, body)
+            if found:
+                kind, row, text = found
+                line = f"{self.table.where(row)}: {self.name}: {text}."
+                problems.add(kind, line)
+                return False
+        return True
+
+    @property
+    def _indices(self) -> range:
+        return range(len(self.bodies))
+
+    def _problem(self, first: int, body: int) -> tuple[str, np.integer, str] | None:
+        """Return kind, row and text of what is wrong with a body's rows, if anything.
+
+        Args:
+            first: body to which its times and its pusher are compared.
+            body: index of the body.
+        """
+        rows, named = self.rows[body], f"body {self.bodies[body]!r}"
+        if not len(rows):
+            text = f"{named} is missing; all pushes of a file need the same bodies"
+            return "missing body", self.rows[first][0], text
+        time, wanted = self.column("time", body), self.column("time", first)
+        fall = first_fall(time)
+        if fall is not None:
+            same = time[fall] == time[fall - 1]
+            wrong = "appears twice" if same else f"comes after {time[fall - 1]:.12g}"
+            text = f"{named}: time {time[fall]:.12g} {wrong}; sort the times of each "
+            return "clock", rows[fall], text + "body in a push, or remove the row"
+        missing, added = ~np.isin(wanted, time), ~np.isin(time, wanted)
+        if missing.any():
+            at = int(np.argmax(missing))
+            text = f"{named} is missing at time {wanted[at]:.12g}; add its row"
+            return "missing time", self.rows[first][at], text
+        if added.any():
+            at = int(np.argmax(added))
+            text = f"another body is missing at time {time[at]:.12g}; add its row"
+            return "missing time", rows[at], text
+        apart = np.abs(self.pusher(body) - self.pusher(first)).max(axis=1)
+        if (apart > _SAME_PLACE).any():
+            text = "the pusher is elsewhere than in the row of another body at the same"
+            row = rows[np.argmax(apart > _SAME_PLACE)]
+            return "pusher", row, f"{text} time; repair one of them"
+        return None
+
+    def to_recording(self, problems: Problems) -> Recording | None:
+        """Return the recording; None after adding a problem of its group."""
+        surface = ""
+        if "group" in self.table.texts:
+            group, rows = self.table.texts["group"], np.concatenate(self.rows)
+            other = group.code[rows] != group.code[rows[0]]
+            if other.any():
+                line = self.table.where(rows[np.argmax(other)])
+                line = f"{line}: {self.name} is in several groups; use one."
+                problems.add("groups", line)
+                return None
+            surface = group.names[group.code[rows[0]]]
+        pose = np.stack(
+            [
+                np.column_stack([self.column(n, b) for n in ("x", "y", "angle")])
+                for b in self._indices
+            ],
+            axis=1,
+        )
+        pose[..., 2] = np.unwrap(pose[..., 2], axis=0)
+        return Recording(
+            time=self.column("time", 0),
+            pose=pose,
+            pusher=self.pusher(0),
+            conditions=Conditions(surface=surface),
+            source=f"{self.table.path}: {self.name}",
+        )

@@ -1,1 +1,0 @@
-"""Anybody's own pushes: a table from CSV or Parquet, checked row by row."""

@@ -1,0 +1,275 @@
+"""Tables of recorded pushes: named columns of one file, and problems by row."""
+
+import csv
+import io
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sainet.runs.documents import read_file
+from sainet.runs.errors import BadTable
+from sainet.scenes.quantities import Quantity
+
+LARGEST = 1 << 30  # bytes
+MOST_ROWS = 20_000_000
+MOST_PROBLEMS = 8  # lines of one message
+SHOWN = 40  # characters of a quoted value
+_SEPARATORS = {";": "semicolons", "\t": "tabs"}
+
+
+class Problems:
+    """Problems of the files of one import: the first of each kind, one line each."""
+
+    def __init__(self) -> None:
+        """Begin without a problem."""
+        self._lines: dict[str, str] = {}
+
+    def add(self, kind: str, line: str) -> None:
+        """Add a problem unless one of its kind is there."""
+        self._lines.setdefault(kind, line)
+
+    def check(self, quantity: Quantity, value: float, where: str) -> bool:
+        """Return whether a value is in its range; if not, add the problem."""
+        try:
+            quantity.check(value, where, error=BadTable)
+        except BadTable as error:
+            self.add(quantity.name, str(error))
+            return False
+        return True
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """The kinds of problems that were found."""
+        return frozenset(self._lines)
+
+    def __bool__(self) -> bool:
+        """Return whether any problem was found."""
+        return bool(self._lines)
+
+    def raise_any(self) -> None:
+        """Raise `BadTable` if there are problems: one line each, at most eight."""
+        lines = list(self._lines.values())
+        if len(lines) > MOST_PROBLEMS:
+            more = len(lines) - MOST_PROBLEMS + 1
+            lines = [
+                *lines[: MOST_PROBLEMS - 1],
+                f"and {more} other kinds of problems.",
+            ]
+        if lines:
+            raise BadTable(*lines)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Columns:
+    """Columns of a format: texts, of which some may be missing, and numbers."""
+
+    texts: tuple[str, ...]
+    numbers: tuple[str, ...]
+    optional: tuple[str, ...] = ()  # texts
+    allows_others: bool = False
+    note: str = ""  # units, for messages
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """The columns that must be there."""
+        return self.texts + self.numbers
+
+    def check(self, path: Path, header: Sequence[str], problems: Problems) -> bool:
+        """Return whether all columns are there once.
+
+        Columns that are missing, duplicated or unknown are added to the problems.
+        """
+        known = (*self.wanted, *self.optional)
+        unknown = [name for name in dict.fromkeys(header) if name not in known]
+        wrong = {
+            "missing": [n for n in self.wanted if n not in header],
+            "there twice": [n for n in known if header.count(n) > 1],
+            "unknown": [] if self.allows_others else [n[:SHOWN] for n in unknown],
+        }
+        for what, names in wrong.items():
+            if names:
+                hints = [_hint(n, unknown) if what == "missing" else "" for n in names]
+                told = ", ".join(n + hint for n, hint in zip(names, hints, strict=True))
+                verb = f"column {told} is" if len(names) == 1 else f"columns {told} are"
+                line = f"{path}: row 1: {verb} {what}.{self.note}"
+                problems.add(f"columns {what}", line)
+        return not (wrong["missing"] or wrong["there twice"])
+
+
+def _hint(name: str, unknown: Sequence[str]) -> str:
+    similar = get_close_matches(name, unknown, n=1, cutoff=0.5)
+    return f" (is it {similar[0][:SHOWN]!r}?)" if similar else ""
+
+
+@dataclass(frozen=True)
+class Texts:
+    """A column of texts."""
+
+    code: Int[np.ndarray, " row"]  # index into names
+    names: list[str]  # in the order in which they first appear
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of a table; a column with a problem in its name is left out."""
+
+    path: Path
+    line: Int[np.ndarray, " row"]  # of the file
+    texts: dict[str, Texts]
+    numbers: dict[str, Float[np.ndarray, " row"]]
+    is_whole: bool = True  # all columns, no row left out, no text empty
+    row_name: str = "row {}"  # names a line in messages
+
+    @property
+    def rows(self) -> int:
+        """The number of rows."""
+        return len(self.line)
+
+    def where(self, row: int | np.integer) -> str:
+        """Return file and row as messages name them."""
+        return f"{self.path}: {self.row_name.format(self.line[row])}"
+
+    def check(self, problems: Problems, quantity: Quantity, *names: str) -> None:
+        """Add a problem if columns contain a value outside the range of a quantity."""
+        for name in names:
+            values = self.numbers.get(name)
+            if values is None:
+                continue
+            outside = np.flatnonzero((values < quantity.low) | (values > quantity.high))
+            if len(outside):
+                row = int(outside[np.argmax(np.abs(values[outside]))])
+                problems.check(quantity, values[row], f"{self.where(row)}: {name}")
+
+
+def read_bytes(path: Path, *endings: str) -> bytes:
+    """Return the content of a file with one of the given endings.
+
+    Raises:
+        BadTable: another ending, or the file cannot be read or is too large.
+    """
+    if path.suffix.lower() not in endings:
+        raise BadTable(f"{path}: unsupported file type; use {' or '.join(endings)}.")
+    return read_file(path, most=LARGEST, error=BadTable)
+
+
+def read_csv(path: Path, data: bytes, columns: Columns, problems: Problems) -> Table:
+    """Read a table from CSV; its rows are lines of the file, from 1.
+
+    Args:
+        path: named in messages.
+        data: content of the file.
+        columns: of the format.
+        problems: to which problems of header and values are added.
+
+    Raises:
+        BadTable: the file is not CSV text or is empty.
+    """
+    reader = _Reader(path, columns, problems)
+    try:
+        text = data.decode("utf-8-sig")
+        if "\0" in text:
+            raise csv.Error
+        separator = _separator(path, text.partition("\n")[0], problems)
+        lines = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
+        reader.read_header([name.strip() for name in next(lines, [])])
+        for fields in filter(None, lines):
+            reader.read_row(lines.line_num, fields)
+    except (UnicodeDecodeError, csv.Error):
+        raise BadTable(f"{path}: not CSV text; save it as UTF-8 CSV.") from None
+    if not reader.lines and not problems:
+        raise BadTable(f"{path}: has no rows; add rows below the header.")
+    return reader.table()
+
+
+def _separator(path: Path, header: str, problems: Problems) -> str:
+    for separator, name in _SEPARATORS.items():
+        if separator in header and "," not in header:
+            line = f"{path}: row 1: {name} separate the columns; use commas."
+            problems.add("separator", line)
+            return separator
+    return ","
+
+
+@dataclass
+class _Reader:
+    """Collects the rows of a table."""
+
+    path: Path
+    columns: Columns
+    problems: Problems
+    header: list[str] = field(default_factory=list)
+    lines: "array[int]" = field(default_factory=lambda: array("q"))
+    texts: dict[str, tuple["array[int]", dict[str, int]]] = field(default_factory=dict)
+    numbers: dict[str, "array[float]"] = field(default_factory=dict)
+    is_whole: bool = True
+
+    def read_header(self, header: list[str]) -> None:
+        if not header:
+            raise BadTable(f"{self.path}: empty; the first row names the columns.")
+        self.is_whole = self.columns.check(self.path, header, self.problems)
+        self.header = header
+        texts = (*self.columns.texts, *self.columns.optional)
+        self.texts = {name: (array("q"), {}) for name in texts if name in header}
+        named = [name for name in self.columns.numbers if name in header]
+        self.numbers = {name: array("d") for name in named}
+
+    def read_row(self, line: int, fields: list[str]) -> None:
+        where = f"{self.path}: row {line}"
+        if len(fields) != len(self.header):
+            self.is_whole = False
+            self.problems.add(
+                "fields",
+                f"{where}: has {len(fields)} fields, not {len(self.header)} as the "
+                "header has; it is cut or broken: repair or remove the row.",
+            )
+            return
+        if len(self.lines) == MOST_ROWS:
+            raise BadTable(f"{self.path}: has over {MOST_ROWS} rows; split the file.")
+        self.lines.append(line)
+        row = dict(zip(self.header, fields, strict=True))
+        for name, (codes, names) in self.texts.items():
+            text = row[name].strip()
+            if not text:
+                self.is_whole = False
+                self.problems.add(
+                    f"empty {name}", f"{where}: {name} is empty; write its name."
+                )
+            codes.append(names.setdefault(text, len(names)))
+        for name, values in self.numbers.items():
+            values.append(number(row[name], f"{where}: {name}", self.problems))
+
+    def table(self) -> Table:
+        return Table(
+            path=self.path,
+            line=np.array(self.lines, np.int64),
+            texts={
+                name: Texts(np.array(codes, np.int64), list(names))
+                for name, (codes, names) in self.texts.items()
+            },
+            numbers={k: np.array(v, float) for k, v in self.numbers.items()},
+            is_whole=self.is_whole,
+        )
+
+
+def number(text: str, where: str, problems: Problems) -> float:
+    """Return the finite number that a text spells; else add a problem, return NaN.
+
+    Python also reads 1_000 and digits of other scripts; tables mean something else.
+    """
+    try:
+        value = float(text) if text.isascii() and "_" not in text else np.nan
+    except ValueError:
+        value = np.nan
+    if np.isfinite(value):
+        return value
+    problems.add(
+        f"number {where.rpartition(': ')[2]}",
+        f"{where} is {text[:SHOWN]!r}; it must be a finite number: repair or remove "
+        "the row.",
+    )
+    return np.nan
