@@ -3,7 +3,7 @@
 import pytest
 
 from sainet.cli.output import Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.progress import Pace, progress_bar
 
 PATH = "runs/[test]/[/test]/" + "a" * 80
 
@@ -32,3 +32,36 @@ def test_a_bar_shows_names_as_they_are(name, capsys, monkeypatch):
     shown = capsys.readouterr().err
     assert f"Pushing ({name})" in shown
     assert f"{name} solved" in shown
+
+
+def test_the_rate_is_that_after_the_first_units(monkeypatch):
+    now = iter([70.0, 72.0, 74.0])  # s; compilation takes 70 s
+    monkeypatch.setattr("time.perf_counter", lambda: next(now))
+    pace = Pace()
+    assert pace.add(1) is None
+    assert pace.add(10) == 5.0
+    assert pace.add(10) == 5.0
+
+
+def test_before_the_first_unit_the_bar_shows_compiling(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    with (
+        pytest.raises(KeyboardInterrupt),
+        progress_bar("Training", 2, Output()) as advance,
+    ):
+        advance(0)
+        raise KeyboardInterrupt
+    shown = capsys.readouterr().err
+    assert "compiling" in shown
+    assert "0/2" not in shown
+
+
+@pytest.mark.parametrize("amounts", [(), (2,), (1, 1)])
+def test_a_finished_bar_is_full_and_compiles_no_more(amounts, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress_bar("Training", 2, Output()) as advance:
+        for amount in amounts:
+            advance(amount)
+    shown = capsys.readouterr().err
+    assert "2/2" in shown
+    assert "compiling" not in shown

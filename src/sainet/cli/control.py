@@ -68,7 +68,9 @@ class Control:
 
         first = records[0]
         film = self.out / f"episode-000{best_format()}"
-        with progress_bar("Drawing", frame_count(first), self.output) as advance:
+        with progress_bar(
+            "Drawing", frame_count(first), self.output, waiting=""
+        ) as advance:
             write_film(first, film, on_frame=lambda: advance(1, film.name))
         config = self.config
         report = Report(

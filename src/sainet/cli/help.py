@@ -6,7 +6,7 @@ import re
 from dataclasses import MISSING, Field, fields, is_dataclass
 from itertools import pairwise
 from textwrap import dedent
-from typing import Annotated, Any, Generic, get_type_hints
+from typing import Annotated, Any, Generic, get_args, get_type_hints
 
 import tyro
 from tyro.conf import DisallowNone, arg
@@ -51,9 +51,12 @@ def _option(field: Field[Any], kind: Any, text: str, owner: object) -> StructFie
         settings["help_behavior_hint"] = f"(default: {stated['value']})"
     elif value is None or value == () or isinstance(value, bool):
         settings["help_behavior_hint"] = ""
-    kind = Annotated[kind, arg(**settings)]
     if value is None:
         kind = Annotated[kind, DisallowNone]
+    elif type(None) in get_args(kind):
+        (other,) = (each for each in get_args(kind) if each is not type(None))
+        settings["metavar"] = f"{other.__name__.upper()}|None"
+    kind = Annotated[kind, arg(**settings)]
     return StructFieldSpec(
         name=field.name,
         type=kind,

@@ -30,7 +30,7 @@ class Identify:
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
-        title = f"Fitting to {store.info.pushes} pushes, a minute or so"
+        title = f"Fitting to {store.info.pushes} pushes"
         with progress_bar(title, None, self.output) as advance:
             found = identify_into(
                 store, self.out, on_try=lambda error: advance(1, f"error {error:.3f}")

@@ -1,56 +1,78 @@
 """A progress bar with rate and time left, on standard error."""
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from sainet.cli.output import Output
-from sainet.runs.interrupts import raise_if_interrupted
 
-Advance = Callable[[int, str], None]  # by how much, and a note
+Advance = Callable[[int, str], None]  # number of finished units, and a note
+COMPILING = "compiling"
+
+
+@dataclass
+class Pace:
+    """Rate of the units after the first report, whose time includes compilation."""
+
+    begun: float | None = None  # s, time of the first report
+    counted: int = 0  # units since then
+
+    def add(self, units: int) -> float | None:
+        """Count units; returns units per second, None until two reports."""
+        now = time.perf_counter()
+        if self.begun is None:
+            self.begun = now if units else None
+            return None
+        self.counted += units
+        return self.counted / (now - self.begun) if self.counted else None
 
 
 @contextmanager
-def progress_bar(title: str, total: int | None, output: Output) -> Iterator[Advance]:
-    """Show a bar while something goes on; what is given advances it.
+def progress_bar(
+    title: str, total: int | None, output: Output, *, waiting: str = COMPILING
+) -> Iterator[Advance]:
+    """Show a progress bar and yield the function that advances it.
 
     Args:
-        title: what is going on.
-        total: how much there is to do; None where nobody knows.
+        title: text before the bar.
+        total: number of units; None where it is unknown.
         output: `quiet` shows nothing.
+        waiting: note until the first units are finished; the bar pulses meanwhile.
     """
     from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
         Progress,
-        ProgressColumn,
-        Task,
         TextColumn,
         TimeRemainingColumn,
     )
-    from rich.text import Text
-
-    class Rate(ProgressColumn):
-        """How much is done in a second."""
-
-        def render(self, task: Task) -> Text:
-            speed = task.finished_speed or task.speed
-            return Text(f"{speed:.1f}/s" if speed else "", style="cyan")
 
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        Rate(),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[rate]}", style="cyan"),
+        TimeRemainingColumn(elapsed_when_finished=True),
         TextColumn("{task.fields[note]}", markup=False),
     )
     bar = Progress(*columns, console=Console(stderr=True), disable=output.quiet)
+    pace = Pace()
     with bar:
-        task = bar.add_task(title, total=total, note="")
+        task = bar.add_task(title, total=None, note=waiting, rate="")
 
         def advance(amount: int, note: str = "") -> None:
-            raise_if_interrupted()
-            bar.update(task, advance=amount, note=note)
+            rate = pace.add(amount)
+            begun = pace.begun is not None
+            bar.update(
+                task,
+                advance=amount,
+                total=total if begun else None,
+                note=note if begun else note or waiting,
+                rate="" if rate is None else f"{rate:.1f}/s",
+            )
 
         yield advance
+        if pace.begun is None:  # everything was finished before
+            bar.update(task, total=total, completed=total or 0, note="")

@@ -123,7 +123,7 @@ def _draw(
         curves, out / "error-over-time.svg", time_step=test.info.time_step
     )
     return Report(
-        title="Simulator-augmented interaction networks, in three minutes",
+        title="Simulator-augmented interaction networks, at small scale",
         subtitle="A robot pushes a disk that pushes another: engine, network, and both",
         summary=_SUMMARY.format(
             pushes=config.pushes,
