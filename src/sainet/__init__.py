@@ -1,4 +1,4 @@
-"""Simulator-augmented interaction networks: teach an engine what it gets wrong.
+"""Simulator-augmented interaction networks for planar pushing.
 
 The names below are loaded when first used, so that ``import sainet`` costs nothing
 and has no side effects.
@@ -18,6 +18,8 @@ _HOMES = {
     "ForceControls": "sainet.scenes.controls",
     "GenerateConfig": "sainet.datasets.config",
     "InteractionNetwork": "sainet.models.correctors.interaction",
+    "Model": "sainet.models.model",
+    "ModelId": "sainet.models.identity",
     "PathControls": "sainet.scenes.controls",
     "PlanarEngine": "sainet.engines.planar.engine",
     "Push": "sainet.scenes.pushes",
@@ -25,6 +27,7 @@ _HOMES = {
     "Scene": "sainet.scenes.scene",
     "State": "sainet.scenes.state",
     "Trajectory": "sainet.scenes.state",
+    "at_rest": "sainet.scenes.state",
     "evaluate": "sainet.evaluation.evaluate",
     "fit": "sainet.learning.fit",
     "generate": "sainet.datasets.generate",
@@ -55,12 +58,14 @@ if TYPE_CHECKING:
     from sainet.learning.fit import fit
     from sainet.models.correctors.interaction import InteractionNetwork
     from sainet.models.dynamics import AbstractDynamics, predict
+    from sainet.models.identity import ModelId
     from sainet.models.library import load_model
+    from sainet.models.model import Model
     from sainet.planning import make_planner
     from sainet.scenes.controls import ForceControls, PathControls
     from sainet.scenes.pushes import Push, PushGrid
     from sainet.scenes.scene import Scene
-    from sainet.scenes.state import State, Trajectory
+    from sainet.scenes.state import State, Trajectory, at_rest
 
 __all__ = [
     "AbstractDynamics",
@@ -71,6 +76,8 @@ __all__ = [
     "ForceControls",
     "GenerateConfig",
     "InteractionNetwork",
+    "Model",
+    "ModelId",
     "PathControls",
     "PlanarEngine",
     "Push",
@@ -78,6 +85,7 @@ __all__ = [
     "Scene",
     "State",
     "Trajectory",
+    "at_rest",
     "evaluate",
     "fit",
     "generate",

@@ -106,7 +106,11 @@ class Reproduce:
         names = tuple(EXPERIMENTS)
         for lacks, lacking, needs in (
             (self.recorded is None, "--recorded", needs_recorded),
-            (find_spec("pybullet") is None, "PyBullet", needs_bullet),
+            (
+                find_spec("pybullet") is None,
+                "PyBullet (Python 3.11 only)",
+                needs_bullet,
+            ),
         ):
             left = [name for name in names if lacks and needs(name)]
             if left:

@@ -17,7 +17,11 @@ from sainet.scenes.state import State, Trajectory, unpack_motion
 
 
 class AbstractDynamics(eqx.Module):
-    """Predicts how scenes move; all arguments share one leading batch axis.
+    """Predicts how scenes move; all arguments share one leading axis, push.
+
+    Arrays of a `State` are [push, body, ...], of its pusher [push, 2]; those of
+    `Controls` [push, time, 2]; those of a `Trajectory` [push, time, body, ...], its
+    pusher [push, time, 2]. `examples/03_own_model.py` defines a model.
 
     `begin` restarts everything at the state that it is given; `advance` never does,
     so that two advances equal one long one.

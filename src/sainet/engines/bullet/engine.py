@@ -114,6 +114,7 @@ def _how_to_install() -> str:
         here = ".".join(map(str, sys.version_info[:2]))
         return (
             "The engine bullet needs PyBullet, which has no wheels for Python "
-            f"{here}; use Python 3.11, or the engine planar."
+            f"{here}, where the extra 'bullet' installs nothing; use Python 3.11, or "
+            "the engine planar."
         )
     return "The engine bullet needs PyBullet: pip install 'sainet[bullet]'."
