@@ -19,6 +19,7 @@ from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
+from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, Diverged
 from sainet.scenes.state import State, Trajectory
 
@@ -189,10 +190,12 @@ def test_a_network_is_not_used_on_other_pushes_unless_forced(simulated):
 
 
 def test_recorded_pushes_of_the_training_are_no_test(recorded):
-    card = structs.replace(CARD, data=recorded.content)
-    with pytest.raises(BadCheckpoint, match=r"was trained on them.*`force`"):
+    seen = digests_to_text(recorded.first(3).push_hashes())
+    card = structs.replace(CARD, pushes=seen)
+    with pytest.raises(BadCheckpoint, match=rf"trained on 3 of these {PUSHES}.*split"):
         evaluate([resting(card=card)], recorded)
-    evaluate([resting(card=card)], recorded.first(PUSHES - 1))
+    evaluate([resting(card=card)], recorded.take(range(3, PUSHES)))
+    evaluate([resting(card=card)], recorded, force=True)
 
 
 def test_predictions_of_a_network_are_those_of_its_rollout(simulated):

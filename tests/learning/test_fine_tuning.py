@@ -23,6 +23,7 @@ from sainet.models.dynamics import predict
 from sainet.models.frame import push_frame
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import find_internal_engine, load_model
+from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.scenes.state import pack_motion
 
@@ -65,6 +66,8 @@ def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
     card, before = read_card(out), read_card(start / "sain")
     assert card.started_from == before.weights
     assert (before.data_seeds, card.data_seeds) == ((0,), (0,))
+    assert before.pushes == ""
+    assert pushes_overlap(card.pushes, store.push_hashes()) == store.info.pushes
     assert (card.truth_engine, card.identity.features) == ("recorded", "paper")
     task = Task("sain", store, TUNING, PLANAR, load(start / "sain"))
     first = begin(task)[0].network

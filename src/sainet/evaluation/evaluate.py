@@ -134,8 +134,9 @@ def evaluate(
             f"`model`: {', '.join(names)} are not all different; rename one."
         )
     info = store.info
+    hashes = store.push_hashes() if info.is_recorded and not force else None
     for model in () if force else models:
-        model.check_fits(info.kind, info.time_step, seed=info.seed, data=store.content)
+        model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
     arrays = _read(store)
     limit = _limit(store, steps)
     parts = list(_parts_of_one_length(arrays, limit))

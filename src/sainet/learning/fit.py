@@ -33,6 +33,7 @@ from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.identity import ModelId, TrainingData
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
+from sainet.runs.digests import digests_from_text, digests_to_text
 from sainet.runs.documents import content_hash, read_json, write_document
 from sainet.runs.errors import Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
@@ -238,6 +239,7 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         camera=task.assumed.camera if sain else AGREES,
         data=task.store.content,
         data_seeds=seeds if info.seed is None else (*seeds, info.seed),
+        pushes=_pushes(task.store, start),
         weights=content_hash(data),
         started_from=start.weights if start else None,
         recurrent=task.config.recurrent,
@@ -270,3 +272,10 @@ def _training_data(task: Task) -> TrainingData:
         return "tuned"
     is_stroke = task.store.info.bodies == 1  # long pushes of one disk
     return "stroke" if is_stroke else task.start.card.identity.data
+
+
+def _pushes(store: Store, start: Card | None) -> str:
+    """Return the recorded pushes that the network was ever trained on."""
+    before = digests_from_text(start.pushes if start else "")
+    own = store.push_hashes() if store.info.is_recorded else before[:0]
+    return digests_to_text(np.concatenate([before, own]))

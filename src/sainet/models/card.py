@@ -27,6 +27,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     camera: CameraOffset = AGREES  # of the internal engine
     data: str  # hash of the training data
     data_seeds: tuple[int, ...] = ()  # of all simulated training pushes, oldest first
+    pushes: str = ""  # all recorded training pushes (`runs.digests`)
     weights: str  # hash of the weights' file
     started_from: str | None = None  # hash of the weights that training began with
     recurrent: bool = True  # False: trained on single steps

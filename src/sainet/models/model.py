@@ -3,9 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import UInt64
+
 from sainet.models.card import CARD, Card
 from sainet.models.dynamics import AbstractDynamics
 from sainet.models.identity import ModelId
+from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint
 
 _SAME_TIME = 1e-9  # s
@@ -32,7 +36,7 @@ class Model:
         time_step: float,
         *,
         seed: int | None = None,
-        data: str | None = None,
+        pushes: UInt64[np.ndarray, " push"] | None = None,
     ) -> None:
         """Raise `BadCheckpoint` if the network is not for these pushes.
 
@@ -40,7 +44,7 @@ class Model:
             kind: setup of the pushes.
             time_step: of the pushes (s).
             seed: of simulated test pushes; None otherwise.
-            data: hash of the test pushes, if the network is tested on any.
+            pushes: hashes of recorded test pushes (`Store.push_hashes`), if any.
         """
         if self.card is None:
             return
@@ -61,8 +65,9 @@ class Model:
                 "have been trained on these very pushes. Generate others with another "
                 "`seed`, or give `force`."
             )
-        if data is not None and data == self.card.data:
+        seen = 0 if pushes is None else pushes_overlap(self.card.pushes, pushes)
+        if pushes is not None and seen:
             raise BadCheckpoint(
-                f"{path}: data is {data[:12]}..., and so are these pushes: the network "
-                "was trained on them. Test it on others, or give `force`."
+                f"{path}: the network was trained on {seen} of these {len(pushes)} "
+                "pushes. Test it on others ('sainet split'), or give `force`."
             )
