@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datasets.own_pushes import PROPERTIES, rows, to_csv, write
+from datasets.own_pushes import HEADER, PROPERTIES, rows, to_csv, write
 from datasets.raw_pushes import name, pack, recording, to_json
 from sainet.cli.entry import run
 from sainet.datasets import batch, predictions
@@ -38,6 +38,22 @@ def test_physics_is_evaluated_on_what_was_imported(
     found = json.loads(capfd.readouterr().out.splitlines()[-1])["rows"]
     assert {row["model"] for row in found} == set(models)
     assert all(row["n"] == 1 and 0 < row["pos_mm"] < 100 for row in found)
+
+
+def test_a_group_is_evaluated_alone(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
+    named = [(f"{group}{k}", group) for k, group in enumerate(("wood", "felt", "wood"))]
+    table = [[*row, group] for name, group in named for row in rows(name)]
+    path, bodies = write(tmp_path / "in", to_csv(table, [*HEADER, "group"]))
+    words = ["import", "table", str(path), "--properties", str(bodies)]
+    data = str(tmp_path / "out")
+    assert run([*words, "--out", data, "--json"]) == 0
+    assert json.loads(capfd.readouterr().out)["groups"] == ["felt", "wood"]
+    words = ["evaluate", "--model", "physics", "--data", data, "--devices", "2"]
+    assert run([*words, "--group", "wood", "--json", "--quiet"]) == 0
+    found = json.loads(capfd.readouterr().out.splitlines()[-1])["rows"]
+    assert {(row["group"], row["n"]) for row in found} == {("wood", 2)}
+    assert run([*words, "--group", "glass"]) == 2
+    assert "no group 'glass'" in capfd.readouterr().err
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(
@@ -121,7 +137,8 @@ def test_the_example_of_the_documentation_is_imported(tmp_path: Path):
     ]
     start = blocks.index("push,time,body,x,y,angle,pusher_x,pusher_y")
     table = blocks[start : start + 6] + ["1,0.008,blue,0.4050,0,0,0.2454,0.0010"]
-    properties = "\n".join(blocks[blocks.index("[bodies.red]") :])
+    rest = blocks[blocks.index("[bodies.red]") :]
+    properties = "\n".join(line for line in rest if not line.startswith("sainet"))
     path, bodies = write(tmp_path / "in", "\n".join([*table, ""]), properties)
     words = ["import", "table", str(path), "--properties", str(bodies)]
     assert run([*words, "--out", str(tmp_path / "out"), "--quiet"]) == 0
