@@ -22,17 +22,17 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-# What BASE may still call models, engines and arrays, and what they are called now.
+# Models, engines and arrays: the name that BASE may still use, and today's.
 RENAMED = {
     f"{name}-calibrated": f"{name}-true"
     for name in ("physics", "sain", "planar", "bullet")
 }
-# Sections of pages with another title now: {"results: old title": "results: new"}.
+# Renamed sections of pages: {"results: old title": "results: new title"}.
 TITLES: dict[str, str] = {}
-# Keys of JSON that hold times, or that BASE does not have.
+# Keys of JSON that are not compared: times, and what BASE lacks.
 EXEMPT = {"median_decision_s"}
 _STORE = "--pushes 60 --chunk-size 30 --seed 7 --out"
-# Words of commands, which find here what those before them made.
+# Each command ends with its output folder; the later ones read earlier outputs.
 COMMANDS = (
     f"generate robot --disks 1 {_STORE} robot-1",
     "generate robot --engine bullet --assumed-engine planar bullet planar-calibrated "
@@ -54,7 +54,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("base", help="a checkout, or a git revision")
     parser.add_argument("--tolerance", type=float, default=0.0, help="relative")
-    parser.add_argument("--recorded", type=Path, help="recorded pushes to import")
+    absolute = lambda text: Path(text).resolve()  # noqa: E731
+    parser.add_argument("--recorded", type=absolute, help="recorded pushes to import")
     chosen = parser.parse_args()
     differ = False
     with tempfile.TemporaryDirectory() as work:
@@ -64,13 +65,13 @@ def main() -> int:
             if chosen.recorded or "recorded" not in command:
                 words = command.replace("RECORDED", str(chosen.recorded)).split()
                 made = (_run(*place, words) for place in places)
-                differ |= _say(command, _first(*made, tolerance=chosen.tolerance))
+                differ |= _print(command, _first(*made, tolerance=chosen.tolerance))
     for title, difference in _pages(base):
-        differ |= _say(title, difference)
+        differ |= _print(title, difference)
     return int(differ)
 
 
-def _say(name: str, difference: str) -> bool:
+def _print(name: str, difference: str) -> bool:
     print(f"{name}: {difference or 'equal'}", flush=True)
     return bool(difference)
 
@@ -91,8 +92,8 @@ def _run(tree: Path, place: Path, words: list[str]) -> dict[str, Any]:
     place.mkdir(exist_ok=True)
     environment = os.environ | {"PYTHONPATH": str(tree / "src")}
     problem = ""
-    for said in (words, list(map(_renamed, words))):
-        line = (sys.executable, "-m", "sainet", *said, "--json", "--quiet")
+    for spelling in (words, list(map(_renamed, words))):
+        line = (sys.executable, "-m", "sainet", *spelling, "--json", "--quiet")
         done = subprocess.run(
             line, check=False, cwd=place, env=environment, capture_output=True
         )
