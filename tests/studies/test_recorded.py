@@ -19,7 +19,7 @@ from sainet.studies import (
     recorded_pushes,
 )
 from sainet.studies.recorded_models import Variant, surfaces_of
-from sainet.studies.stand_in import Robot
+from sainet.studies.surrogate import Robot
 
 FEW = (
     Variant("sain", "simulation", "identified"),
@@ -128,7 +128,7 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
 @pytest.mark.slow
 def test_ways_to_tune_are_compared_over_robots(make, monkeypatch, tmp_path):
     one = {"learning_rate": 1e-3, "mirror": False}
-    robots = (Robot("a", believed_friction=0.25), Robot("b", unexplained=0))
+    robots = (Robot("a", assumed_friction=0.25), Robot("b", unexplained=0))
     monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
     monkeypatch.setattr(fine_tuning, "WAYS", (("engine", one),))
     monkeypatch.setattr(fine_tuning, "WAYS_WITH_FEW", (("engine", {}),))

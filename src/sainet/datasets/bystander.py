@@ -1,10 +1,11 @@
-"""Pushes with one disk more, which nothing touches: it stays, and nothing else changes.
+"""Bystanders: disks added to stored pushes, which nothing touches.
 
-In two-disk pushes the disks touch: a network that trains on these alone never sees a
-disk that does not act, and what it says of one is no zero. Nobody has to simulate or to
-record a bystander to know the truth about it. It can be added to any push whose paths
-are known, and lies wherever those leave it alone, also right beside another disk. Only
-the assumed engine has to be asked again: it may believe that the disks overlap.
+In two-disk pushes the disks touch: a network trained only on such pushes predicts an
+effect even between disks that do not interact. The ground truth of a bystander needs
+neither simulation nor recording, because it stays at rest and changes nothing else. A
+bystander can be added to any push with known paths, at any position that these paths
+never reach, also next to another disk. Only the simulator prediction is computed again:
+with assumed radii the disks may overlap.
 """
 
 from collections.abc import Callable
@@ -22,10 +23,10 @@ from sainet.datasets.store import Store
 from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import BadStore
 
-TOUCHING = 0.5  # share of the tries that are in touch with another disk
-FARTHEST = 0.02  # m, the widest gap to the disk beside which one lies
-_TOUCH = 1e-5  # m, a gap that no rounding makes an overlap
-_BESIDE_PUSHER = 5e-4  # m, by which the pushed disk is nearer to the pusher
+TOUCHING = 0.5  # fraction of the attempts that touch another disk
+FARTHEST = 0.02  # m, largest gap to the nearest disk
+_TOUCH = 1e-5  # m, gap of touching disks: rounding never makes it an overlap
+_BESIDE_PUSHER = 5e-4  # m: the pushed disk is nearer to the pusher by at least this
 _TRIES = 64
 _NOWHERE_NEAR = 1.0  # m
 _STREAM = 0xB157A
@@ -38,18 +39,18 @@ def add_bystander(
     seed: int = 0,
     on_pushes: Callable[[int], None] = lambda pushes: None,
 ) -> Store:
-    """Write a dataset of the same pushes, each with a bystander, once.
+    """Return a dataset of the same pushes, each with a bystander; written once.
 
     Args:
         store: read whole into memory.
         out: the run folder.
-        seed: of the bystanders' masses, radii and places.
-        on_pushes: told how many pushes an assumed engine has just predicted.
+        seed: of the bystanders' masses, radii and positions.
+        on_pushes: called with the number of newly predicted pushes.
 
     Raises:
-        BadStore: the paths of its disks are not known all the way.
-        RunConflict: the folder holds something else.
-        MissingExtra: an assumed engine needs a package that is not installed.
+        BadStore: the path of a disk is unknown at some step.
+        RunConflict: the folder belongs to another run.
+        MissingExtra: an internal engine needs a package that is not installed.
     """
     rng = np.random.default_rng([_STREAM, seed])
 
@@ -65,13 +66,13 @@ def _check_paths(store: Store, arrays: Arrays) -> None:
     known &= np.isfinite(arrays["truth_pusher"]).all(2)
     if not (known | ~_lasts(arrays)).all():
         raise BadStore(
-            f"{store.path}: truth is not known at every step, so nobody can say where "
-            "a bystander would lie untouched; give pushes whose paths are known."
+            f"{store.path}: truth is unknown at some steps, so no position is certain "
+            "to stay untouched; give pushes with known paths."
         )
 
 
 def _lasts(arrays: Arrays) -> Bool[np.ndarray, "push time"]:
-    """Return which steps belong to each push."""
+    """Return whether each step belongs to its push or follows its end."""
     return np.arange(arrays["truth"].shape[1]) < arrays["steps"][:, None]
 
 
@@ -81,10 +82,10 @@ def with_bystander(
     rng: np.random.Generator,
     on_pushes: Callable[[int], None] = lambda pushes: None,
 ) -> Arrays:
-    """Return every array of a store with one disk more in each push, the last one.
+    """Return every array of a store with a bystander as the last disk of each push.
 
-    Its mass and radius are drawn uniformly from the range that the store has. It is
-    captured without noise. Of published predictions it has none (NaN).
+    Its mass and radius are uniform within the range of the store. Its measured poses
+    have no noise, and its published predictions are NaN.
     """
     pushes = len(arrays["mass"])
     still = {
@@ -112,7 +113,7 @@ def with_bystander(
 
 
 def _append(array: np.ndarray, values: np.ndarray | None, axis: int) -> np.ndarray:
-    """Return an array with one more along an axis; NaN where nothing is known of it."""
+    """Return an array with one more entry along an axis; NaN if it has no values."""
     shape = (*array.shape[:axis], 1, *array.shape[axis + 1 :])
     one = np.broadcast_to(np.nan if values is None else values, shape)
     return np.concatenate([array, one.astype(array.dtype)], axis=axis)
@@ -132,7 +133,7 @@ def _simulate(
 
 
 class _Round(NamedTuple):
-    """A round thing in each push: where it is, at the start and after each step."""
+    """A disk or the pusher: its path in each push, the start included."""
 
     path: Float[np.ndarray, "push time 2"]
     radius: Float[np.ndarray, " push"]
@@ -143,7 +144,7 @@ class _Round(NamedTuple):
     def gaps(
         self, place: Float[np.ndarray, "push 2"], radius: Float[np.ndarray, " push"]
     ) -> Float[np.ndarray, "push time"]:
-        """Return the gaps to a disk that stays (m); negative: overlap."""
+        """Return the gaps to a disk at rest (m); negative for an overlap."""
         apart = np.linalg.norm(self.path - place[:, None], axis=-1)
         return apart - self.radius[:, None] - radius[:, None]
 
@@ -151,7 +152,10 @@ class _Round(NamedTuple):
 def _place(
     arrays: Arrays, radius: Float[np.ndarray, " push"], rng: np.random.Generator
 ) -> Float[np.ndarray, "push 2"]:
-    """Return where nothing touches such a disk, beside another one if possible."""
+    """Return positions of untouched bystanders (m), next to another disk if possible.
+
+    A bystander without such a position is far away from all disks.
+    """
     *disks, pusher = _round_things(arrays)
     place = disks[0].path[:, 0] + _NOWHERE_NEAR
     left = np.arange(len(radius))
@@ -172,10 +176,10 @@ def _place(
 
 
 def _round_things(arrays: Arrays) -> list[_Round]:
-    """Return the disks, and the pusher as the last."""
+    """Return the disks, then the pusher."""
     initial, truth = arrays["initial"][:, None, :, :2], arrays["truth"][..., :2]
     hand = arrays["initial_pusher"][:, None]
-    # What follows the end of a push never happened: the start stands in for it.
+    # Steps after the end of a push repeat the start.
     truth = np.where(_lasts(arrays)[..., None, None], truth, initial)
     pusher = np.where(_lasts(arrays)[..., None], arrays["truth_pusher"], hand)
     paths = np.concatenate([initial, truth], axis=1, dtype=float)
@@ -193,9 +197,9 @@ def _is_free(
     disks: list[_Round],
     pusher: _Round,
 ) -> Bool[np.ndarray, " push"]:
-    """Return whether all pass by, and the pusher starts nearest to another disk.
+    """Return whether nothing reaches the position and it is not nearest to the pusher.
 
-    For which disk is pushed is told by which is nearest to the pusher at the start.
+    The disk nearest to the pusher at the start counts as the pushed disk.
     """
     gaps = [thing.gaps(place, radius).min(1) for thing in (*disks, pusher)]
     hand = pusher.path[:, 0]

@@ -1,4 +1,4 @@
-"""Batches of stored pushes in a random order that the iteration alone decides."""
+"""Batches of stored pushes, in a random order set by seed and iteration."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -11,15 +11,15 @@ import numpy as np
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
 
-_WINDOW = 8  # chunks that are shuffled together
+_WINDOW = 8  # chunks shuffled together
 _ORDER_STREAM = 0x0DE5
 
 
 @dataclass
 class ChunkCache:
-    """Chunks of some arrays, as many as fit in memory, the last used ones.
+    """Cache of the most recently used chunks of some arrays, up to a memory limit.
 
-    `complete` adds to a chunk what is not stored but computed.
+    `complete` adds computed arrays to the stored arrays of a chunk.
     """
 
     store: Store
@@ -30,7 +30,7 @@ class ChunkCache:
     _size: int = 0
 
     def get(self, index: int) -> Arrays:
-        """Return one chunk, read from disk unless it was used lately."""
+        """Return one chunk, read from disk if it is not in the cache."""
         if index not in self._chunks:
             rows = self.store.info.chunk_slice(index)
             chunk = self.complete(self.store.read(rows, self.names))
@@ -42,7 +42,7 @@ class ChunkCache:
         return self._chunks[index]
 
     def gather(self, pushes: np.ndarray) -> Arrays:
-        """Return the arrays of some pushes, in their order."""
+        """Return the arrays of some pushes, in the given order."""
         owners = pushes // self.store.info.chunk_size
         picked: Arrays = {}
         for owner in np.unique(owners):
@@ -62,11 +62,11 @@ def _bytes(chunk: Arrays) -> int:
 
 @dataclass
 class BatchReader:
-    """Reads batches of pushes of one length, never the store whole.
+    """Reader of batches of pushes of equal length, without loading the whole store.
 
-    Which pushes make up a batch depends on the seed and the iteration alone, so that
-    an interrupted training goes on with the same batches. `complete` adds to a chunk
-    what is not stored but computed.
+    The pushes of a batch depend only on the seed and the iteration, so that a resumed
+    training run reads the same batches. `complete` adds computed arrays to the stored
+    arrays of a chunk.
     """
 
     store: Store
@@ -77,7 +77,7 @@ class BatchReader:
     complete: Callable[[Arrays], Arrays] = lambda arrays: arrays
 
     def __post_init__(self) -> None:
-        """Look up the lengths and start the thread that reads ahead."""
+        """Read the lengths and start the thread that reads ahead."""
         self._cache = ChunkCache(self.store, self.names, self.memory, self.complete)
         self._steps = self.store.read(slice(None), ("steps",))["steps"]
         self._order = lru_cache(maxsize=2)(self._batches_of_epoch)
@@ -85,7 +85,7 @@ class BatchReader:
         self._ahead: dict[int, object] = {}
 
     def batch(self, iteration: int) -> tuple[Arrays, int]:
-        """Return the arrays of a batch and the number of steps of its pushes."""
+        """Return the arrays of a batch and the number of steps of each push."""
         ready = self._ahead.pop(iteration, None)
         ready = ready or self._thread.submit(self._read, iteration)
         self._ahead = {iteration + 1: self._thread.submit(self._read, iteration + 1)}
@@ -104,7 +104,7 @@ class BatchReader:
         return self._cache.gather(chosen), int(self._steps[chosen[0]])
 
     def _batches_of_epoch(self, epoch: int) -> list[np.ndarray]:
-        """Shuffle chunks, then pushes within a few chunks; cut them into batches."""
+        """Return the batches of an epoch: shuffled chunks, then shuffled pushes."""
         rng = np.random.default_rng([_ORDER_STREAM, self.seed, epoch])
         info = self.store.info
         chunks = rng.permutation(info.chunks)
@@ -118,7 +118,7 @@ class BatchReader:
         return self._cut(np.concatenate(batches))
 
     def _cut(self, order: np.ndarray) -> list[np.ndarray]:
-        """Cut into whole batches of one length; a length too rare is repeated."""
+        """Return whole batches of equal length; pushes of rare lengths repeat."""
         batches = []
         for steps in np.unique(self._steps):
             same = order[self._steps[order] == steps]

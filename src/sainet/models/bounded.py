@@ -4,18 +4,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-# Typical sizes of x, y (m), angle (rad) and their rates: they make a gradient with
-# respect to packed motion one without units.
+# Typical sizes of x, y (m), angle (rad) and their rates, which make a gradient with
+# respect to packed motion dimensionless.
 GRADIENT_SIZES = (0.01, 0.01, 0.05, 0.03, 0.03, 0.2)
-GRADIENT_BOUND = 5.0  # of a push's loss to its motion in these sizes; about 1 is usual
+GRADIENT_BOUND = 5.0  # norm of a push's gradient in these sizes; typically about 1
 
 
 @jax.custom_vjp
 def bound_gradient(motion: Float[Array, "6 body push"]) -> Float[Array, "6 body push"]:
-    """Return the motion; on the way back, shorten each push's gradient to the bound.
+    """Return the motion, and bound the gradient of each push in the backward pass.
 
-    A push whose prediction runs away has a gradient that grows with every step, and
-    would outweigh all others of its batch (Graves 2013 bounds recurrent gradients so).
+    The gradient of a diverging prediction grows with every step and would dominate its
+    batch (Graves 2013 bounds recurrent gradients in the same way).
     """
     return motion
 

@@ -1,4 +1,4 @@
-"""Models for a robot and a camera that do not agree about where things are."""
+"""Models with a camera offset: robot and camera measure different positions."""
 
 from typing import Any
 
@@ -15,11 +15,10 @@ from sainet.scenes.state import State, Trajectory
 
 
 class OffsetCamera(AbstractDynamics):
-    """Wraps a model: the camera sees all things moved from where the robot has them.
+    """Wrapper that converts pusher positions between robot and camera coordinates.
 
-    It is the camera that says where the disks are, and the robot where the pusher is.
-    The wrapped model, network and engine, is shown the pusher as the camera would see
-    it; states that are returned have it where the robot does.
+    The camera measures the disks, the robot the pusher. The wrapped model receives the
+    pusher position in camera coordinates; returned states have it in robot coordinates.
     """
 
     dynamics: AbstractDynamics
@@ -27,16 +26,16 @@ class OffsetCamera(AbstractDynamics):
 
     @property
     def on_host(self) -> bool:
-        """Whether the wrapped model has an engine that works outside JAX."""
+        """Whether the wrapped model has an engine that runs outside JAX."""
         return self.dynamics.on_host
 
     @property
     def made_for(self) -> Purpose | None:
-        """What the network in the wrapped model was made for."""
+        """The purpose of the network in the wrapped model; None without a network."""
         return self.dynamics.made_for
 
     def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
-        """Start at the state."""
+        """Return the carry of the wrapped model at the state."""
         return self.dynamics.begin(scene, move_pusher(state, self._offset))
 
     def advance(
@@ -46,9 +45,9 @@ class OffsetCamera(AbstractDynamics):
         controls: Controls,
         simulated: Trajectory | None = None,
     ) -> tuple[Any, Trajectory]:
-        """Advance the wrapped model."""
-        seen = move_controls(controls, self._offset)
-        carry, trajectory = self.dynamics.advance(scene, carry, seen, simulated)
+        """Return the carry and the states after each step of the wrapped model."""
+        moved = move_controls(controls, self._offset)
+        carry, trajectory = self.dynamics.advance(scene, carry, moved, simulated)
         return carry, Trajectory(move_pusher(trajectory.states, -self._offset))
 
     @property

@@ -1,8 +1,8 @@
-"""The push frame: where a network sees the scene from.
+"""The push frame: the frame of the inputs and outputs of a network.
 
 Its x axis is the contact normal, from the pusher to the pushed disk, at the start of
-the push. What a network sees is turned into it and what it says is turned back, so
-that translation, rotation and permutation symmetry hold by construction.
+the push. Inputs are transformed into the frame and outputs back, so that translation,
+rotation and permutation symmetry hold by construction.
 """
 
 import equinox as eqx
@@ -18,7 +18,7 @@ from sainet.scenes.state import State
 
 
 class PushFrame(eqx.Module):
-    """A frame on the table, and which disk is pushed in it."""
+    """Push frames on the table, with the pushed disk of each."""
 
     origin: Float[Array, "*batch 2"]  # m, centre of the pushed disk
     angle: Float[Array, "*batch"]  # rad, of the contact normal
@@ -26,7 +26,7 @@ class PushFrame(eqx.Module):
 
 
 def push_frame(scene: Scene, state: State) -> PushFrame:
-    """Return the frame of the disk that is nearest to the pusher's surface."""
+    """Return the frame of the pushed disk, the disk nearest to the pusher's surface."""
     nearest = jnp.argmin(pusher_gaps(scene, state), axis=-1)
     pushed = jax.nn.one_hot(nearest, scene.body_count, dtype=scene.mass.dtype)
     origin = jnp.sum(pushed[..., None] * state.position, axis=-2)
@@ -36,7 +36,7 @@ def push_frame(scene: Scene, state: State) -> PushFrame:
 def motion_to_frame(
     motion: Float[Array, "*batch body 6"], frame: PushFrame
 ) -> Float[Array, "*batch body 6"]:
-    """Turn packed motion from the table's frame into the push frame."""
+    """Return packed motion of the table frame in the push frame."""
     place = motion[..., 0:2] - frame.origin[..., None, :]
     return _turn(motion, place, -frame.angle)
 
@@ -44,7 +44,7 @@ def motion_to_frame(
 def motion_from_frame(
     motion: Float[Array, "*batch body 6"], frame: PushFrame
 ) -> Float[Array, "*batch body 6"]:
-    """Undo `motion_to_frame`."""
+    """Return packed motion of the push frame in the table frame."""
     back = _turn(motion, motion[..., 0:2], frame.angle)
     place = back[..., 0:2] + frame.origin[..., None, :]
     return jnp.concatenate([place, back[..., 2:]], axis=-1)

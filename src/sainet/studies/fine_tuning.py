@@ -1,4 +1,4 @@
-"""How to fine-tune on few pushes, chosen on simulated robots (see `stand_in`)."""
+"""Settings of fine-tuning on few pushes, compared on surrogate robots."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -14,7 +14,7 @@ from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.few_pushes import recipe
 from sainet.studies.paper_setup import join
-from sainet.studies.stand_in import ROBOTS, Robot, recordings
+from sainet.studies.surrogate import ROBOTS, Robot, recordings
 
 Change = dict[str, Any]
 

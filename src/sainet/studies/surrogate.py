@@ -1,17 +1,17 @@
-"""Robots that stand in for a real one: settings are chosen on their pushes.
+"""Surrogate robots: simulated robots with injected errors, for choosing settings.
 
-Pushes and disk are those of the recorded ones, but simulated, with three times the
-usual noise (the pusher does not tremble, see `strokes`), in all directions, and seen at
-their ends alone. Ends scatter as widely as those of a recorded push made twice. Most of
-that is the table: a smooth random function of where on it, in which direction and on
-which of its sides the disk is pushed. The rest is chance, and one recording in twenty
-fails: the disk is seen elsewhere than where it ended. What is to be told is where it
-ended, so in tests nothing is left to chance.
+Disk and pushes match the recorded ones, but are simulated with three times the usual
+noise (without tracking error, see `strokes`), at all headings, and only their final
+poses are observed. Final poses scatter as widely as those of repeated recorded pushes.
+Most of the scatter comes from the table: a smooth random function of position, heading
+and the side of the disk. The rest is random, and one recording in twenty fails: its
+measured final pose is wrong. The true final pose is to be predicted, so test pushes
+have no random errors.
 
-The robots differ in what else the engine inside the model gets wrong. One has a
-friction of contact that the engine does not know: nobody has identified it. The others
-have been identified, and what is left no parameter of the engine explains: ends lie off
-by smooth random functions of the angle at which the pusher meets the disk.
+The robots differ in the other errors of the internal engine. One has a contact friction
+that was not identified. The others are identified, and their remaining errors cannot be
+explained by engine parameters: final poses deviate by smooth random functions of the
+contact angle.
 """
 
 from dataclasses import dataclass, replace
@@ -30,50 +30,50 @@ from sainet.studies.strokes import STROKES
 
 _FRICTION = 0.4  # of contact
 _ENGINE = "planar"
-_SPREAD = 0.028  # of the places on the table, standard deviation on each axis, m
-# Standard deviations: along and across the push (m), and of the angle (rad). Table and
-# chance together are what is left between recordings of one push on ABS at two speeds,
-# whatever an identified engine says of them; what no parameter explains is of the size
-# that the errors of such an engine have beyond that. What the table does, and what is
-# unexplained, is of a disk that goes as far as the pusher: two thirds of it over all.
-# The table's are those of random functions before their mean is taken off.
+_SPREAD = 0.028  # m, standard deviation of positions on the table, per axis
+# Standard deviations along and across the push (m) and of the angle (rad). Table and
+# random errors together match the difference between recordings of one push on ABS at
+# two speeds, which no engine can predict; unexplained errors match the remaining errors
+# of an identified engine. Table and unexplained errors are those of a disk that travels
+# as far as the pusher; the average disk travels two thirds of that. Table errors are
+# those of random functions before their mean is subtracted.
 _UNEXPLAINED = np.array([0.0006, 0.0006, np.deg2rad(5.5)])
 _TABLE = np.array([0.002, 0.002, np.deg2rad(7.0)])
 _CHANCE = (0.0011, 0.0011, np.deg2rad(3.0))
-_FAILED = 0.05  # share of the recordings that are trained on
+_FAILED = 0.05  # fraction of the training recordings
 _FAILED_BY = (0.01, 0.01, np.deg2rad(20))
 _WAVES = 64  # of a random function
-_WAVE_ANGLE = np.deg2rad(20)  # over which what is unexplained changes
-_WAVE_LENGTH, _WAVE_TURN = 0.1, 2.0  # over which what the table does changes, m and rad
+_WAVE_ANGLE = np.deg2rad(20)  # correlation angle of unexplained errors
+_WAVE_LENGTH, _WAVE_TURN = 0.1, 2.0  # correlation lengths of table errors, m and rad
 _PUSHER = ("initial_pusher", "command_position", "truth_pusher")
 _PLACES, _HEIGHTS = 0x91ACE, 0x7AB1E  # streams of random numbers
 
 
 @dataclass(frozen=True)
 class Robot:
-    """What the engine inside the model gets wrong about a robot."""
+    """A surrogate robot: the errors of the internal engine on its pushes."""
 
     name: str
-    believed_friction: float = _FRICTION
-    unexplained: int | None = None  # which random functions, None: none at all
+    assumed_friction: float = _FRICTION
+    unexplained: int | None = None  # seed of the random functions; None for no errors
 
 
 ROBOTS = (
-    Robot("unidentified", believed_friction=0.25),
+    Robot("unidentified", assumed_friction=0.25),
     Robot("identified-a", unexplained=0),
     Robot("identified-b", unexplained=1),
 )
 
 
 def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) -> Store:
-    """Return what was recorded of some pushes of a robot.
+    """Return the recorded pushes of a robot.
 
     Args:
-        robot: that pushes.
-        name: of the dataset; nothing is left to chance and none fails in `tests`.
-        pushes: how many.
-        seed: of the pushes and of what fails.
-        chain: in whose folder they are kept.
+        robot: the surrogate robot.
+        name: of the dataset; `tests` has no random errors and no failures.
+        pushes: number of pushes.
+        seed: of the pushes and the failures.
+        chain: owner of the folder for datasets.
     """
     made = chain.simulate(
         f"{name}-simulated",
@@ -81,7 +81,7 @@ def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) ->
             STROKES,
             pushes=pushes,
             chunk_size=pushes,
-            seed=100 + seed,  # of none that a shipped network was trained on
+            seed=100 + seed,  # unlike the training pushes of shipped networks
             contact_friction=(_FRICTION,),
             speed_mm_s=(20.0,),
             hold_steps=0,
@@ -90,7 +90,7 @@ def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) ->
     )
     is_test = name == "tests"
     settings = {
-        "believed_friction": robot.believed_friction,
+        "assumed_friction": robot.assumed_friction,
         "observed": "ends",
         "unexplained": robot.unexplained,
         "unexplained_sizes": [*_UNEXPLAINED],
@@ -113,7 +113,7 @@ def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) ->
 def _as_recorded(
     arrays: Arrays, info: StoreInfo, robot: Robot, *, is_test: bool
 ) -> Arrays:
-    """Return what is known of such pushes: the ends, and a friction."""
+    """Return the pushes with observed final poses and the assumed friction."""
     push, last = np.arange(info.pushes), arrays["steps"] - 1
     arrays = placed(arrays, info.seed)
     off, seen_off = of_the_table(arrays), np.zeros((info.pushes, 3))
@@ -123,12 +123,12 @@ def _as_recorded(
         seen_off = _recording_errors(info)
     observed = np.zeros_like(arrays["pose_observed"])
     observed[push, last] = 1
-    believed = np.full_like(arrays["pusher_friction"], robot.believed_friction)
+    assumed = np.full_like(arrays["pusher_friction"], robot.assumed_friction)
     known = arrays | {
         "truth": arrays["truth"] + np.pad(_at_all_steps(off), [*[(0, 0)] * 3, (0, 3)]),
         "measured": arrays["measured"] + _at_all_steps(off + seen_off),
-        "pusher_friction": believed,
-        "disk_friction": believed,
+        "pusher_friction": assumed,
+        "disk_friction": assumed,
         "pose_observed": observed,
         "rate_observed": np.zeros_like(observed),
     }
@@ -140,12 +140,12 @@ def _as_recorded(
 def _at_all_steps(
     off: Float[np.ndarray, "push 3"],
 ) -> Float[np.ndarray, "push 1 1 3"]:
-    """Return what is added to every pose of a push: its end alone is looked at."""
+    """Return deviations that apply to every pose; only the last one is observed."""
     return off[:, None, None].astype(np.float32)
 
 
 def _recording_errors(info: StoreInfo) -> Float[np.ndarray, "push 3"]:
-    """Draw by how much each end is seen elsewhere than where it was, m and rad."""
+    """Return random measurement errors of the final poses, m and rad."""
     rng = np.random.default_rng(info.seed)
     failed = rng.permutation(info.pushes) < round(_FAILED * info.pushes)
     sizes = np.where(failed[:, None], _FAILED_BY, _CHANCE)
@@ -153,9 +153,9 @@ def _recording_errors(info: StoreInfo) -> Float[np.ndarray, "push 3"]:
 
 
 def placed(arrays: Arrays, seed: int | None) -> Arrays:
-    """Return pushes that went from the origin as if made all over a table.
+    """Return pushes from the origin, moved to random positions on the table.
 
-    Each is moved and turned as a whole, and its disk on itself.
+    Each push is translated and rotated as a whole, and its disk rotated in place.
     """
     rng = np.random.default_rng([_PLACES, seed or 0])
     count = len(arrays["steps"])
@@ -192,10 +192,10 @@ def placed(arrays: Arrays, seed: int | None) -> Arrays:
 
 
 def unexplained(arrays: Arrays, seed: int) -> Float[np.ndarray, "push 3"]:
-    """Return by how much ends lie off what any parameter says, m and rad.
+    """Return deviations that no engine parameter explains, m and rad.
 
-    What is off along the push is the same for the mirrored push, what is off across it
-    and in angle is opposite.
+    For a mirrored push the deviation along the push is equal, and those across the push
+    and in angle are opposite.
     """
     along, across, _ = _directions(arrays)
     normal = arrays["initial"][:, 0, :2] - arrays["initial_pusher"]
@@ -209,10 +209,10 @@ def unexplained(arrays: Arrays, seed: int) -> Float[np.ndarray, "push 3"]:
 
 
 def of_the_table(arrays: Arrays) -> Float[np.ndarray, "push 3"]:
-    """Return by how much the place on the table lets ends lie off, m and rad.
+    """Return deviations caused by the table, m and rad.
 
-    Its mean over all places, directions and sides is zero: what is the same everywhere
-    could be learned without knowing where.
+    Their mean over all positions, headings and sides is zero: a network could learn a
+    constant deviation without table features.
     """
     along, _, _ = _directions(arrays)
     disk = arrays["initial"][:, 0, :3]
@@ -230,7 +230,7 @@ def of_the_table(arrays: Arrays) -> Float[np.ndarray, "push 3"]:
 def _mean(
     wave: Float[np.ndarray, "kind wave 6"], phase: Float[np.ndarray, "kind wave"]
 ) -> Float[np.ndarray, "kind wave"]:
-    """Return the means of waves over normal places, and any direction and side."""
+    """Return the means of waves over normal positions, uniform headings and sides."""
     place, along, own = (
         np.linalg.norm(wave[..., 2 * part : 2 * part + 2], axis=-1) for part in range(3)
     )
@@ -241,9 +241,9 @@ def _mean(
 def _off(
     arrays: Arrays, size: Float[np.ndarray, "push 3"]
 ) -> Float[np.ndarray, "push 3"]:
-    """Return x, y and angle of what is off along, across and in angle.
+    """Return deviations in x, y and angle from those along, across and in angle.
 
-    A disk that is hardly moved is hardly moved elsewhere.
+    Deviations are proportional to the distance that the disk travels.
     """
     along, across, stroke = _directions(arrays)
     path = arrays["truth"][:, -1, 0, :2] - arrays["initial"][:, 0, :2]
@@ -255,7 +255,7 @@ def _off(
 def _directions(
     arrays: Arrays,
 ) -> tuple[np.ndarray, np.ndarray, Float[np.ndarray, "push 1"]]:
-    """Return the directions along and across each push, and its length (m)."""
+    """Return unit vectors along and across each push, and its length (m)."""
     push = arrays["command_position"][:, -1] - arrays["initial_pusher"]
     stroke = np.linalg.norm(push, axis=-1, keepdims=True)
     along = push / stroke

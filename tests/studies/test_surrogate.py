@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sainet.datasets.store import open_store
-from sainet.studies.stand_in import (
+from sainet.studies.surrogate import (
     ROBOTS,
     Robot,
     of_the_table,
@@ -140,12 +140,12 @@ def test_what_the_table_does_is_nothing_on_average():
 
 
 def test_robots_are_not_alike():
-    assert len({(r.believed_friction, r.unexplained) for r in ROBOTS}) == len(ROBOTS)
+    assert len({(r.assumed_friction, r.unexplained) for r in ROBOTS}) == len(ROBOTS)
 
 
 @pytest.mark.slow
 def test_recordings_know_the_ends_alone_and_a_friction(chain):
-    robot = Robot("wrong", believed_friction=0.25, unexplained=0)
+    robot = Robot("wrong", assumed_friction=0.25, unexplained=0)
     right = Robot("right")
     stores = {
         (each.name, name): recordings(each, name, 20, seed, chain).read(slice(None))
