@@ -113,7 +113,7 @@ def test_every_name_in_all_resolves(name: str):
     assert not missing
 
 
-def test_the_verbs_of_the_method_are_public():
+def test_the_main_functions_are_public():
     verbs = {"generate", "fit", "predict", "evaluate", "identify"}
     verbs |= {"make_planner", "run_episode", "run_trials"}
     assert verbs <= set(importlib.import_module("sainet").__all__)
@@ -125,7 +125,7 @@ def in_a_fresh_python(code: str, *arguments: str) -> subprocess.CompletedProcess
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_importing_the_package_and_its_command_line_leaves_jax_alone():
+def test_importing_the_command_line_does_not_import_jax():
     code = "import sys, sainet, sainet.cli; print(sorted(sys.modules))"
     done = in_a_fresh_python(code)
     assert done.returncode == 0, done.stderr
@@ -134,7 +134,7 @@ def test_importing_the_package_and_its_command_line_leaves_jax_alone():
     assert not {name for name in heavy if f"'{name}'" in done.stdout}
 
 
-def test_help_comes_at_once():
+def test_help_is_fast():
     code = "from sainet.cli import main; main()"
     seconds = []
     for _ in range(3):
@@ -195,7 +195,7 @@ def test_locks_cover_every_dependency_and_no_torch():
     assert not left_out & names["requirements.lock"]
 
 
-def test_the_version_stands_in_one_piece():
+def test_the_version_is_the_same_everywhere():
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
     assert importlib.import_module("sainet").__version__ == project["version"]
     changelog = (REPOSITORY / "CHANGELOG.md").read_text()

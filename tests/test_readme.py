@@ -57,7 +57,7 @@ json.dump(asked, sys.stdout)
 
 
 @pytest.mark.parametrize("page", COMMANDS)
-def test_commands_parse_and_no_two_of_a_page_want_one_folder_for_two_things(page: str):
+def test_documented_commands_parse_and_use_distinct_folders(page: str):
     found = subprocess.run(
         [sys.executable, "-c", PARSER],
         input=json.dumps(COMMANDS[page]),
@@ -95,7 +95,7 @@ def test_the_readme_names_the_test_command_that_ci_runs():
     assert last.endswith("make test")
 
 
-def test_this_reader_of_readmes_sees_commands():
+def test_the_reader_finds_commands():
     text = "```bash\n$ sainet demo  # all\nsainet train \\\n  sain\nmake test\n```\n"
     text += "\n    sainet bench  # all\n"
     assert commands(text) == ["sainet demo", "sainet train sain", "sainet bench"]

@@ -100,7 +100,7 @@ def shipped(package: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("version", ["this", "another"])
-def test_the_wheel_works_where_nothing_else_is(
+def test_the_wheel_works_in_an_empty_environment(
     version: str, wheel: Path, tmp_path: Path
 ):
     python = Path(sys.executable) if version == "this" else another_python()

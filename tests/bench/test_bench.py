@@ -37,7 +37,7 @@ def network_of(kind: str, *, augmented: bool) -> InteractionNetwork:
     return InteractionNetwork(features, time_step=TIME_STEP, key=jax.random.key(0))
 
 
-def test_the_counted_work_is_what_one_counts_by_hand():
+def test_the_counted_work_equals_a_count_by_hand():
     rel = 15 * 128 + 128 * 64 + 64 * 32 + 32 * 16
     dyn = 29 * 128 + 128 * 64 + 64 * 32 + 32 * 16 + 16 * 3
     by_hand = 3 * 2 * (2 * rel + 2 * dyn) * 100 * 200 / 1e9
@@ -67,7 +67,7 @@ def is_jaxpr(value: object) -> bool:
 @pytest.mark.parametrize("bodies", [2, 3])
 @pytest.mark.parametrize("augmented", [False, True])
 @pytest.mark.parametrize("kind", ["robot", "direct-force"])
-def test_the_counted_work_is_what_jax_compiles(kind, augmented, bodies):
+def test_the_counted_work_equals_the_compiled_work(kind, augmented, bodies):
     network, pushes = network_of(kind, augmented=augmented), 7
     drive, still = driven(kind, augmented, pushes, bodies), stills(pushes, bodies)
 
@@ -98,7 +98,7 @@ def all_finite(figures: dict, *, but: tuple[str, ...] = ()) -> bool:
     return all(math.isfinite(v) and v > 0 for k, v in figures.items() if k not in but)
 
 
-def test_engines_reports_what_the_docs_say():
+def test_engines_reports_the_documented_figures():
     figures = load_case("engines")(2, batch=6, steps=60)
     assert set(figures) == {
         "planar_scene_steps_per_s",
@@ -131,7 +131,7 @@ def watch_starts(monkeypatch) -> list[set[tuple[str, int]]]:
 
 
 @pytest.mark.slow
-def test_planning_reports_what_the_docs_say(monkeypatch):
+def test_planning_reports_the_documented_figures(monkeypatch):
     kept = watch_starts(monkeypatch)
     figures = load_case("planning")(2, model="physics")
     wanted = ("full_tree_s", "greedy_s", "looked_at", "bullet_push_s", "bullet_ratio")
@@ -152,7 +152,7 @@ def test_planning_reports_what_the_docs_say(monkeypatch):
 
 
 @pytest.mark.slow
-def test_training_reports_what_the_docs_say():
+def test_training_reports_the_documented_figures():
     figures = load_case("training")(2, pushes=3, steps=4, repeats=1)
     assert set(figures) == {
         "iteration_ms",
@@ -174,7 +174,7 @@ def test_training_reports_what_the_docs_say():
     json.dumps(figures, allow_nan=False)
 
 
-def test_every_figure_is_the_median_of_what_was_measured_side_by_side():
+def test_every_figure_is_the_median_of_paired_measurements():
     measured = [
         training_case.Measurement(100.0, 50.0, 100.0),
         training_case.Measurement(200.0, 20.0, 100.0),
@@ -188,17 +188,17 @@ def test_every_figure_is_the_median_of_what_was_measured_side_by_side():
     }
 
 
-def test_the_median_leaves_the_warm_up_and_the_odd_one_out():
+def test_the_median_ignores_the_warm_up_and_one_outlier():
     naps = iter([0.2, 0.01, 0.3, 0.01, 0.01])
     assert 0.01 <= median_seconds(lambda: time.sleep(next(naps)), 4) < 0.15
     assert next(naps, None) is None
 
 
-def test_the_ceiling_is_a_rate_that_a_machine_can_have():
+def test_the_ceiling_is_a_plausible_rate():
     assert 0.1 < ceiling_gflops(2) < 1e6
 
 
-def test_an_unknown_case_names_those_there_are():
+def test_an_unknown_case_lists_the_available_cases():
     with pytest.raises(UnknownName, match="'trainin'.*engines, planning, training"):
         load_case("trainin")
 
@@ -209,7 +209,7 @@ def test_a_case_without_runs_is_bad_input(name):
         load_case(name)(0)
 
 
-def test_figures_of_several_cases_stand_apart(monkeypatch):
+def test_figures_of_several_cases_are_separate_objects(monkeypatch):
     ran, alone = [], {"bullet_ratio": 2.0}
 
     def slow_case():
@@ -228,7 +228,7 @@ def test_figures_of_several_cases_stand_apart(monkeypatch):
     assert len(ran) == 3  # nothing is measured when a name is wrong
 
 
-def test_listing_the_cases_leaves_jax_alone():
+def test_listing_the_cases_does_not_import_jax():
     code = "import sys, sainet.bench; sys.exit('jax' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
@@ -246,7 +246,7 @@ def trained() -> Trained:
     return Trained(problem, [loop.first_loss, *later])
 
 
-def test_the_loop_that_is_timed_trains(trained: Trained):
+def test_the_timed_loop_trains(trained: Trained):
     assert sorted(trained.losses, reverse=True) == trained.losses
 
 
@@ -267,13 +267,13 @@ def test_torch_computes_the_same_losses_and_steps(trained: Trained, tmp_path: Pa
 
 
 @needs_torch
-def test_a_peer_that_fails_says_why(tmp_path: Path):
+def test_a_failing_peer_reports_its_error(tmp_path: Path):
     with pytest.raises(SainetError, match="absent.npz"):
         run_torch(tmp_path / "absent.npz", 1)
 
 
 @pytest.mark.parametrize("loss", [1.01, 0.99, math.nan])
-def test_a_peer_that_does_other_work_is_refused(loss, monkeypatch):
+def test_a_peer_with_another_first_loss_is_refused(loss, monkeypatch):
     result = {"loss": loss, "iteration_ms": 7.0}
     monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
     with pytest.raises(SainetError, match="same work"):
@@ -286,6 +286,6 @@ def test_a_peer_may_differ_by_rounding(monkeypatch):
     assert TorchPeer(Path("problem.npz"), 1.0).iteration_ms() == 7.0
 
 
-def test_without_an_environment_the_reason_names_the_way_out(monkeypatch, tmp_path):
+def test_a_missing_environment_gives_a_remedy(monkeypatch, tmp_path):
     monkeypatch.setattr("sainet.bench.peer.FOLDER", tmp_path)
     assert "make torch-env" in str(missing_torch())

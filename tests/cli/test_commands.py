@@ -34,7 +34,7 @@ def test_version():
     assert sainet("--version").stdout == "sainet 0.1.0\n"
 
 
-def test_without_words_the_help_is_shown():
+def test_without_arguments_the_help_is_printed():
     shown = sainet().stdout
     for name in ("demo", "generate", "import", "train", "evaluate", "reproduce"):
         assert name in shown
@@ -51,7 +51,7 @@ def test_without_words_the_help_is_shown():
         (("reproduce", "--trainers", "0"), ("--trainers", "at least 1")),
     ],
 )
-def test_bad_settings_are_named_and_nothing_is_made(tmp_path, words, names):
+def test_bad_settings_are_named_without_output(tmp_path, words, names):
     out = tmp_path / "out"
     error = sainet(*words, "--out", out, status=2).stderr
     assert error.startswith("sainet: ")
@@ -71,7 +71,7 @@ def test_bad_settings_are_named_and_nothing_is_made(tmp_path, words, names):
         (("report", "no-such-folder"), ("no-such-folder", "sainet made")),
     ],
 )
-def test_what_is_missing_is_named(tmp_path, monkeypatch, words, names):
+def test_missing_inputs_are_named(tmp_path, monkeypatch, words, names):
     monkeypatch.chdir(tmp_path)
     error = sainet(*words, status=2).stderr
     assert "Traceback" not in error
@@ -83,7 +83,7 @@ def test_what_is_missing_is_named(tmp_path, monkeypatch, words, names):
     "words",
     [("report", "{}"), ("import", "table", "{}", "--properties", "{}", "--out", "x")],
 )
-def test_a_path_that_cannot_be_is_one_line(words):
+def test_an_impossible_path_gives_one_line(words):
     path = "x" * 300
     error = sainet(*(word.format(path) for word in words), status=2).stderr
     assert error.startswith(f"sainet: {path}")
@@ -99,7 +99,7 @@ def test_an_unknown_command_is_a_usage_error():
     ("command", "told"),
     [(Generate(out=Path("x")), "goes on from here"), (Bench(), "starts over")],
 )
-def test_an_interruption_says_what_the_same_command_would_do(
+def test_an_interruption_names_the_command_that_resumes(
     command, told, monkeypatch, capsys
 ):
     def stop(self):
@@ -119,7 +119,7 @@ def pushes(tmp_path_factory):
     return out
 
 
-def test_the_same_settings_do_nothing_again_and_others_are_refused(pushes):
+def test_equal_settings_do_nothing_and_others_are_refused(pushes):
     before = {p: p.stat().st_mtime_ns for p in pushes.rglob("*")}
     sainet("generate", "robot", *SMALL, "--out", pushes)
     other = [*SMALL[:1], "25", *SMALL[2:]]
@@ -196,7 +196,7 @@ def shown(*words):
     return " ".join(sainet(*words, "--help").stdout.replace("│", " ").split())
 
 
-def test_going_on_from_a_network_has_defaults_of_its_own():
+def test_fine_tuning_has_its_own_defaults():
     usual, tuned = shown("train", "in"), shown("train", "in", "--start-from", "in")
     assert "Number of gradient steps. (default: 10000)" in usual
     assert "Number of gradient steps. (default: 300)" in tuned

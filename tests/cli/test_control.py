@@ -27,7 +27,7 @@ def said(monkeypatch, tmp_path, capsys):
     return run
 
 
-def test_it_says_what_there_is_to_say(said):
+def test_control_prints_its_results(said):
     one = said(1, solved=False)
     assert "0 of 1 easy goals solved (95 % interval 0% to 79%).\n" in one
     assert "each drawn in" in one
@@ -37,7 +37,7 @@ def test_it_says_what_there_is_to_say(said):
     assert "the first 6 drawn in" in seven
 
 
-def test_the_command_of_the_page_can_be_typed():
+def test_the_command_on_the_page_parses():
     odd = ControlConfig(model="runs/my net; ls", trials=3)
     words = shlex.split(control._command(odd))
     assert words[2:] == ["--model", "runs/my net; ls", "--trials", "3", "--animate"]

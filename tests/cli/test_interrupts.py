@@ -73,7 +73,7 @@ def test_a_command_that_has_ended_cannot_be_interrupted(monkeypatch):
     assert ended.value.code == 0
 
 
-def test_a_background_job_still_ignores_what_its_shell_has_it_ignore():
+def test_background_jobs_keep_ignored_signals():
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with remembered_interrupts():
         os.kill(os.getpid(), signal.SIGINT)

@@ -8,7 +8,7 @@ from sainet.cli.progress import Pace, progress_bar
 PATH = "runs/[test]/[/test]/" + "a" * 80
 
 
-def test_a_path_is_printed_as_it_is_on_one_line(capsys):
+def test_a_path_is_printed_unchanged_on_one_line(capsys):
     Output().say(f"Open {PATH} in a browser.")
     assert capsys.readouterr().out == f"Open {PATH} in a browser.\n"
     Output(json=True).say(PATH)
@@ -17,7 +17,7 @@ def test_a_path_is_printed_as_it_is_on_one_line(capsys):
     assert capsys.readouterr().out == "1 Simulating.\n"
 
 
-def test_quiet_says_what_the_result_lacks_alone(capsys):
+def test_quiet_prints_only_warnings(capsys):
     output = Output(quiet=True)
     output.say("Going on ...")
     output.warn("Left out: [in].")
@@ -25,7 +25,7 @@ def test_quiet_says_what_the_result_lacks_alone(capsys):
 
 
 @pytest.mark.parametrize("name", ["[sain]", "[/sain]"])
-def test_a_bar_shows_names_as_they_are(name, capsys, monkeypatch):
+def test_a_progress_bar_prints_names_unchanged(name, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "120")
     with progress_bar(f"Pushing ({name})", 2, Output()) as advance:
         advance(2, f"{name} solved")

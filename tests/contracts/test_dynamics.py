@@ -63,7 +63,7 @@ def assert_same(found: State, wanted: State, tolerance: float):
 
 @every_push
 @every_model
-def test_places_follow_from_velocities(model, kind, bodies):
+def test_poses_follow_from_velocities(model, kind, bodies):
     _, initial, controls = pushes(kind, bodies)
     states = at(predicted(model, kind, bodies), 0)
     motion = np.asarray(pack_motion(states), np.float64)
@@ -133,7 +133,7 @@ def test_two_advances_equal_one_long_one(model, kind, bodies):
 
 
 @every_model
-def test_a_robots_pusher_is_where_it_is_told_to_be(model):
+def test_the_pusher_is_at_its_command(model):
     _, _, controls = pushes("robot", 2)
     states = at(predicted(model, "robot", 2), 0)
     assert isinstance(controls, PathControls)

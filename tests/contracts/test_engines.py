@@ -124,7 +124,7 @@ def energies(scene: Scene, velocity, spin) -> np.ndarray:
 
 
 @every_engine
-def test_coasting_disks_stop_where_coulomb_says(name):
+def test_coasting_disks_stop_at_the_coulomb_distance(name):
     friction = np.repeat([0.05, 0.1, 0.2, 0.3], 2)
     # The step is first order: one that is short against the time to stop is honest.
     speed = np.tile([0.6, 0.8], 4) * np.sqrt(friction / 0.2)
@@ -145,7 +145,7 @@ def test_coasting_disks_stop_where_coulomb_says(name):
 
 
 @every_engine
-def test_spinning_disks_stop_where_their_pressure_says(name):
+def test_spinning_disks_stop_at_the_angle_of_their_pressure(name):
     friction = np.repeat([0.05, 0.1, 0.2], 2)
     radius = np.tile([0.05, 0.06], 3)
     spin = np.array([20, -20, 25, -25, 30, 30.0])
@@ -181,7 +181,7 @@ def test_kinetic_energy_never_grows_without_the_pusher(name):
 
 
 @every_engine
-def test_what_rests_keeps_resting(name):
+def test_bodies_at_rest_stay_at_rest(name):
     config = GenerateConfig(disks=3, pushes=16)
     scene, start, _ = pushed(config, 5, 60)
     # 0.1 mm apart: which of two touching disks rounding takes for an overlap is chance.
@@ -199,7 +199,7 @@ def test_what_rests_keeps_resting(name):
 
 @every_engine
 @every_case
-def test_pushed_disks_follow_without_sinking_in(name, setup, bodies):
+def test_pushed_disks_move_without_overlap(name, setup, bodies):
     scene, _, _, states = case(name, setup, bodies)
     scenes = over_time(scene, STEPS)
     pusher = np.asarray(pusher_gaps(scenes, states))
@@ -227,7 +227,7 @@ def test_quasi_static_path_does_not_depend_on_table_friction(name):
 
 
 @every_engine
-def test_contact_sticks_or_slips_as_coulomb_says(name):
+def test_contacts_stick_or_slip_by_coulombs_law(name):
     """A disk at rest on ice, hit at an angle: stuck if tan(angle) <= 3 mu.
 
     Seen from the contact a disk weighs m along the normal and m / 3 across it.
@@ -319,7 +319,7 @@ def _momenta(scene: Scene, position, velocity, spin):
 
 
 @every_engine
-def test_collisions_on_ice_keep_the_momenta(name):
+def test_collisions_without_friction_conserve_momentum(name):
     scene, start, states, _ = _collisions(name)
     before = _momenta(scene, start.position, start.velocity, start.spin)
     after = _momenta(
@@ -347,7 +347,7 @@ def test_collisions_do_not_bounce(name):
 @every_engine
 @every_case
 @pytest.mark.parametrize("change", PLACEMENTS)
-def test_changed_scenes_change_the_motion_alike(name, setup, bodies, change):
+def test_transformed_scenes_have_the_transformed_motion(name, setup, bodies, change):
     index = 1 + list(PLACEMENTS).index(change)
     states = case(name, setup, bodies).states
     wanted = PLACEMENTS[change].state(part(states, 0))
@@ -359,7 +359,7 @@ def test_changed_scenes_change_the_motion_alike(name, setup, bodies, change):
 
 @every_engine
 @pytest.mark.parametrize(("setup", "bodies"), [c for c in CASES if c[1] > 2])
-def test_renumbered_disks_renumber_the_motion(name, setup, bodies):
+def test_permuted_disks_permute_the_motion(name, setup, bodies):
     states = case(name, setup, bodies).states
     wanted = renumber_state(part(states, 0), swapped(bodies))
     found = part(states, len(PLACEMENTS) + 1)
@@ -399,14 +399,14 @@ def assert_steps_add_up(initial: State, states: State):
 
 @every_engine
 @every_case
-def test_steps_add_up(name, setup, bodies):
+def test_poses_are_sums_of_velocities(name, setup, bodies):
     found = case(name, setup, bodies)
     assert_steps_add_up(found.initial, found.states)
 
 
 @every_engine
 @pytest.mark.parametrize("bodies", [2, 5])
-def test_overlaps_are_undone_and_their_steps_add_up(name, bodies):
+def test_overlaps_are_corrected_by_real_velocities(name, bodies):
     scene, start = _overlapping(bodies)
     states = roll_out(engine(name), scene, start, far_away(BATCH, 240)).states
     assert_steps_add_up(start, states)
@@ -435,7 +435,7 @@ def test_two_advances_equal_one(name, setup, bodies):
 
 @every_engine
 @pytest.mark.parametrize(("setup", "bodies"), [("robot", 2), ("direct-force", 3)])
-def test_a_scene_alone_moves_as_it_does_in_a_batch(name, setup, bodies):
+def test_a_single_scene_moves_as_in_a_batch(name, setup, bodies):
     scene, start, controls, states = case(name, setup, bodies)
     for row in (3, 40):
         alone = roll_out(
@@ -464,7 +464,7 @@ def test_scenes_may_have_any_batch_axes(name):
 
 
 @every_engine
-def test_nothing_is_nan_where_disks_coincide_or_nothing_rubs(name):
+def test_coinciding_disks_and_zero_friction_give_no_nan(name):
     scene, start, controls = pushed(
         GenerateConfig(disks=3, pushes=12),
         2,

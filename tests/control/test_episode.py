@@ -75,7 +75,7 @@ def run(robot, **settings):
     return run_episode(robot, Ahead(), MODEL, TASK, scene(), **settings)
 
 
-def test_it_ends_when_the_task_is_solved():
+def test_an_episode_ends_when_the_task_is_solved():
     told = []
     episode = run(Rail(), on_turn=told.append)
     # 50 mm in steps of 10 mm; within 5.9 mm after the fifth.
@@ -87,7 +87,7 @@ def test_it_ends_when_the_task_is_solved():
     assert all(turn.seconds >= 0 for turn in episode.turns)
 
 
-def test_a_goal_that_is_reached_already_needs_no_push():
+def test_a_reached_goal_needs_no_push():
     robot = Rail()
     robot.state = eqx.tree_at(
         lambda s: s.position, robot.state, robot.state.position.at[1].set(TASK.goal)
@@ -95,12 +95,12 @@ def test_a_goal_that_is_reached_already_needs_no_push():
     assert run(robot).turns == []
 
 
-def test_it_is_given_up_after_so_many_pushes():
+def test_an_episode_is_truncated_after_its_maximum_of_pushes():
     episode = run(Rail(step=0.001), pushes=7)
     assert (episode.reason, len(episode.turns)) == ("out of pushes", 7)
 
 
-def test_a_robot_in_trouble_is_not_asked_for_ever():
+def test_a_robot_in_trouble_ends_the_episode():
     episode = run(Rail(step=0.0, trouble="disk 1 did not move"))
     assert episode.reason == "disk 1 did not move, 3 times in a row"
     assert len(episode.turns) == 3
@@ -143,14 +143,14 @@ def test_a_goal_out_of_reach_is_named_as_the_reason():
     )
 
 
-def test_an_observation_that_is_no_number_ends_it_with_the_reason():
+def test_an_observation_with_nan_ends_the_episode():
     robot = Rail(step=float("nan"))
     episode = run(robot)
     assert episode.reason == "nothing can be planned: observation: position holds NaN"
     assert len(episode.turns) == 1
 
 
-def test_a_model_that_predicts_nothing_finite_ends_it_with_the_reason():
+def test_a_model_without_finite_predictions_ends_the_episode():
     lost = eqx.tree_at(lambda task: task.goal, TASK, TASK.goal * jnp.nan)
     planner = GreedyPlanner(actions=FEW)
     episode = run_episode(Rail(), planner, MODEL, lost, scene())
@@ -159,7 +159,7 @@ def test_a_model_that_predicts_nothing_finite_ends_it_with_the_reason():
     assert episode.turns == []
 
 
-def test_an_interruption_keeps_what_there_is():
+def test_an_interruption_keeps_the_finished_pushes():
     episode = Episode()
     with pytest.raises(KeyboardInterrupt):
         run(Rail(stops_after=2), episode=episode)

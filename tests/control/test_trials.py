@@ -40,7 +40,7 @@ def without_times(record):
     return {k: v for k, v in record.items() if k != "decision_s"}
 
 
-def test_an_episode_is_a_file_that_tells_everything(done):
+def test_an_episode_file_is_complete(done):
     out, records = done
     assert [r["trial"] for r in records] == [0, 1]
     for index, record in enumerate(records):
@@ -58,7 +58,7 @@ def test_an_episode_is_a_file_that_tells_everything(done):
     assert records[0]["goal_mm"] != records[1]["goal_mm"]
 
 
-def test_what_is_there_is_not_run_again_and_what_is_missing_comes_out_the_same(done):
+def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
     out, records = done
     kept = episode_file(out, 0).stat().st_mtime_ns
     episode_file(out, 1).unlink()
@@ -81,7 +81,7 @@ def test_what_is_there_is_not_run_again_and_what_is_missing_comes_out_the_same(d
         ('{"trial": "0"}', "trial is '0'"),
     ],
 )
-def test_a_damaged_episode_is_named_with_the_way_out(tmp_path, done, text, says):
+def test_a_damaged_episode_is_named_with_a_remedy(tmp_path, done, text, says):
     out = tmp_path / "out"
     shutil.copytree(done[0], out)
     episode_file(out, 0).write_text(text)
@@ -89,7 +89,7 @@ def test_a_damaged_episode_is_named_with_the_way_out(tmp_path, done, text, says)
         run_trials(CONFIG, out)
 
 
-def test_an_episode_that_leaves_the_finite_numbers_is_recorded(tmp_path, monkeypatch):
+def test_an_episode_with_nan_is_recorded(tmp_path, monkeypatch):
     def diverge(self, push):
         self.truth = jax.tree.map(lambda x: x * np.nan, self.truth)
         lost = np.full((PUSH_STEPS + 1, 2, 3), np.nan, np.float32)
@@ -133,7 +133,7 @@ def test_an_engine_identified_again_is_another_model(tmp_path, monkeypatch):
         run_trials(config, out)
 
 
-def test_an_interrupted_episode_is_kept_beside(tmp_path, monkeypatch):
+def test_an_interrupted_episode_is_kept_separately(tmp_path, monkeypatch):
     def stop(*args, **settings):
         raise KeyboardInterrupt
 
@@ -161,7 +161,7 @@ trials.run_trials(config, pathlib.Path(sys.argv[1]))
 
 
 @pytest.mark.slow
-def test_a_process_that_is_interrupted_keeps_its_pushes_and_the_next_one_starts_over(
+def test_an_interrupted_process_keeps_its_pushes(
     tmp_path,
 ):
     out = tmp_path / "out"
@@ -207,7 +207,7 @@ def put(name, value):
         (put("trial", 1), "trial is 1, which is another episode"),
     ],
 )
-def test_what_is_wrong_in_an_episode_is_named(tmp_path, done, damage, says):
+def test_errors_in_an_episode_file_are_named(tmp_path, done, damage, says):
     out = tmp_path / "out"
     shutil.copytree(done[0], out)
     known = json.loads(episode_file(out, 0).read_text())
@@ -217,7 +217,7 @@ def test_what_is_wrong_in_an_episode_is_named(tmp_path, done, damage, says):
         run_trials(CONFIG, out)
 
 
-def test_models_see_the_same_worlds_and_their_own_properties():
+def test_models_share_worlds_but_not_properties():
     one, same = (make_trial(replace(CONFIG, model=m), 3) for m in ("physics", "in"))
     np.testing.assert_array_equal(one.task.goal, same.task.goal)
     assert one.robot.scene.table_friction == same.robot.scene.table_friction
@@ -232,7 +232,7 @@ def test_models_see_the_same_worlds_and_their_own_properties():
     assert chain.task.moved == 2
 
 
-def test_an_episode_may_aim_closer_than_it_is_judged(tmp_path, monkeypatch):
+def test_the_stopping_tolerance_may_be_below_the_tolerance(tmp_path, monkeypatch):
     aimed = []
     run = lambda robot, planner, dynamics, task, scene, **_: aimed.append(task)  # noqa: E731
     monkeypatch.setattr(trials, "run_episode", run)
@@ -255,7 +255,9 @@ def test_an_episode_may_aim_closer_than_it_is_judged(tmp_path, monkeypatch):
         ({"deadline": 1.0}, BadInput, "--deadline"),
     ],
 )
-def test_what_cannot_be_is_said_before_anything_is_made(tmp_path, changes, error, says):
+def test_impossible_settings_are_refused_before_any_output(
+    tmp_path, changes, error, says
+):
     with pytest.raises(error, match=says):
         run_trials(replace(CONFIG, **changes), tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -301,7 +303,7 @@ def test_success_has_wilsons_interval():
     assert summarise(records_of([False]))["median_pushes"] is None
 
 
-def test_failures_that_sight_ended_are_told():
+def test_failures_after_a_measured_success_are_counted():
     seen, lost = (records_of([False], reason=r) for r in ("solved", "out of pushes"))
     found = summarise(records_of([True]) + seen + 2 * lost)
     assert (found["solved"], found["ended_early"]) == (1, 1)

@@ -52,7 +52,7 @@ def gaps(wider):
     return apart - (arrays["radius"][:, :-1] + arrays["radius"][:, -1:])[:, None]
 
 
-def test_an_engine_that_knows_all_leaves_it_alone_as_well(wider):
+def test_the_true_engine_does_not_move_the_bystander(wider):
     arrays, info = wider.read(slice(None)), wider.info
     trajectory = roll_out(
         make_engine(info.engine),
@@ -67,7 +67,7 @@ def test_an_engine_that_knows_all_leaves_it_alone_as_well(wider):
     assert np.abs(pusher - arrays["truth_pusher"]).max() < 2e-5
 
 
-def test_the_pushes_are_what_they_were(store, wider):
+def test_the_pushes_are_unchanged(store, wider):
     before, after = store.read(slice(None)), wider.read(slice(None))
     assert wider.info == replace(store.info, bodies=3)
     for name, variable in variables(store.info).items():
@@ -83,7 +83,7 @@ def test_the_pushes_are_what_they_were(store, wider):
     np.testing.assert_array_equal(pushed[1][:, :2], pushed[0])
 
 
-def test_it_stays_beside_another_disk_and_often_touches_it(wider):
+def test_the_bystander_stays_near_a_disk_and_often_touches_it(wider):
     arrays = wider.read(slice(None))
     rest = np.broadcast_to(
         arrays["initial"][:, None, 2], arrays["truth"][:, :, 2].shape
@@ -104,7 +104,7 @@ def test_it_stays_beside_another_disk_and_often_touches_it(wider):
     assert (np.abs(angles) < np.pi / 2).mean() > 0.2
 
 
-def test_the_pusher_passes_by_and_pushes_the_disk_that_it_pushed():
+def test_the_pusher_pushes_the_same_disk():
     info = info_of(1000, assumed_engines=())
     made = made_up(info)
     # The path of the pusher is made up as well, and goes through disk 1.
@@ -118,7 +118,7 @@ def test_the_pusher_passes_by_and_pushes_the_disk_that_it_pushed():
     assert (gaps[:, :, 2].min(-1) < 0.005).any(), "none lay near the pusher"
 
 
-def test_the_assumed_engines_are_asked_again(wider):
+def test_simulator_predictions_are_computed_again(wider):
     arrays = wider.read(slice(None))
     names = [str(push) for push in range(PUSHES)]
     for engine in wider.info.assumed_engines:
@@ -133,7 +133,7 @@ def test_the_assumed_engines_are_asked_again(wider):
     assert moved["planar-true"][:, :2].max() < 2e-5
 
 
-def test_the_seed_decides_and_it_is_made_once(store, tmp_path, monkeypatch):
+def test_the_dataset_depends_on_the_seed_and_is_made_once(store, tmp_path, monkeypatch):
     first = add_bystander(store, tmp_path / "one")
     assert add_bystander(store, tmp_path / "again").content == first.content
     assert add_bystander(store, tmp_path / "other", seed=1).content != first.content
@@ -141,7 +141,7 @@ def test_the_seed_decides_and_it_is_made_once(store, tmp_path, monkeypatch):
     assert add_bystander(store, tmp_path / "one").content == first.content
 
 
-def test_without_room_beside_the_disks_it_lies_far_away(monkeypatch):
+def test_without_room_the_bystander_is_far_away(monkeypatch):
     monkeypatch.setattr(bystander, "_TRIES", 0)
     info = info_of(3, assumed_engines=())
     arrays = made_up(info)
@@ -150,7 +150,7 @@ def test_without_room_beside_the_disks_it_lies_far_away(monkeypatch):
     np.testing.assert_allclose(apart, 1.0, atol=1e-6)
 
 
-def test_what_comes_after_the_end_of_a_push_moves_nothing(monkeypatch):
+def test_steps_after_the_end_move_nothing(monkeypatch):
     """A push may be shorter than its arrays; what fills them up is no motion."""
     info = info_of(8, assumed_engines=())
     arrays = made_up(info, lengths=np.full(8, 6))
@@ -163,7 +163,7 @@ def test_what_comes_after_the_end_of_a_push_moves_nothing(monkeypatch):
     np.testing.assert_array_equal(*drawn)
 
 
-def test_paths_that_are_not_known_are_refused(tmp_path):
+def test_unknown_paths_are_refused(tmp_path):
     info = info_of(4, assumed_engines=())
     for name, push in (("truth", 2), ("truth_pusher", 1)):
         arrays = made_up(info)
@@ -174,7 +174,7 @@ def test_paths_that_are_not_known_are_refused(tmp_path):
         assert not (tmp_path / f"{name}-out" / "hashes.json").exists()
 
 
-def test_the_command_says_what_it_wrote_and_refuses_what_is_no_dataset(
+def test_the_command_reports_its_output_and_refuses_other_folders(
     store, tmp_path, capsys
 ):
     out = tmp_path / "out"

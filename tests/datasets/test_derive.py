@@ -19,14 +19,14 @@ def every_other(arrays):
     return {name: array[::2] for name, array in arrays.items()}
 
 
-def test_what_is_derived_is_a_store_like_any_other(store, tmp_path):
+def test_a_derived_store_is_like_any_other(store, tmp_path):
     found = derive(store, tmp_path / "half", {"kept": "even"}, every_other)
     assert (found.info.pushes, found.info.seed) == (6, store.info.seed)
     for name, array in open_store(tmp_path / "half").read(slice(None)).items():
         np.testing.assert_array_equal(array, store.read(slice(None))[name][::2])
 
 
-def test_it_is_made_once_and_not_of_other_data(store, tmp_path):
+def test_a_derived_store_is_made_once_and_only_from_its_data(store, tmp_path):
     out, told = tmp_path / "half", {"kept": "even"}
     first = derive(store, out, told, every_other)
 

@@ -105,7 +105,7 @@ def test_killed_after_the_last_write_leaves_nothing_behind(whole_store, tmp_path
     assert_same_files(out, whole_store)
 
 
-def test_finished_runs_are_left_alone(whole_store):
+def test_finished_runs_stay_unchanged(whole_store):
     before = {path: path.stat().st_mtime_ns for path in whole_store.rglob("*")}
     store = generate(small(), whole_store)
     assert store.info.pushes == 28
@@ -181,7 +181,7 @@ def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines)
     assert not (tmp_path / "out").exists()
 
 
-def test_truth_beyond_the_numbers_is_refused(tmp_path):
+def test_a_truth_of_nan_is_refused(tmp_path):
     light = small(mass_kg=(1e-42,), pushes=7, noise_level="none")
     with pytest.raises(Diverged, match="push 0 of the dataset: the engine planar left"):
         generate(light, tmp_path / "store")
@@ -195,7 +195,7 @@ def test_a_missing_engine_leaves_nothing_behind(tmp_path, monkeypatch):
         assert not (tmp_path / "out").exists()
 
 
-def test_a_full_disk_says_so_and_goes_on_with_room(whole_store, tmp_path):
+def test_a_full_disk_is_reported_and_the_run_resumes(whole_store, tmp_path):
     with small_disk(tmp_path / "disk") as disk:
         process = start_generating(disk / "store")
         message = process.communicate(timeout=120)[1]
@@ -227,7 +227,9 @@ def small_disk(path):
 
 
 @pytest.mark.parametrize("moment", [0, 1, 2, 6])
-def test_no_space_for_a_json_file_says_so(whole_store, tmp_path, monkeypatch, moment):
+def test_no_space_for_a_json_file_is_reported(
+    whole_store, tmp_path, monkeypatch, moment
+):
     out, count = tmp_path / "store", itertools.count()
     write = type(out).write_bytes
 

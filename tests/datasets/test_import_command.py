@@ -26,7 +26,7 @@ def sources(tmp_path: Path) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize("form", ["mitpush", "table"])
-def test_physics_is_evaluated_on_what_was_imported(
+def test_physics_is_evaluated_on_imported_pushes(
     sources, tmp_path: Path, capfd: pytest.CaptureFixture[str], form: str
 ):
     out = str(tmp_path / "out")
@@ -56,7 +56,7 @@ def test_a_group_is_evaluated_alone(tmp_path: Path, capfd: pytest.CaptureFixture
     assert "no group 'glass'" in capfd.readouterr().err
 
 
-def test_a_folder_that_cannot_be_made_is_one_line(
+def test_an_impossible_folder_gives_one_line(
     sources, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ):
     out = tmp_path / ("x" * 300)
@@ -120,7 +120,7 @@ def test_a_push_that_an_engine_cannot_follow_is_named(
     assert run([*words, "--out", str(out), "--quiet"]) == 0
 
 
-def test_the_command_line_goes_before_the_properties(sources, tmp_path: Path):
+def test_options_override_the_properties_file(sources, tmp_path: Path):
     out = tmp_path / "out"
     words = ["import", "table", *sources["table"], "--out", str(out)]
     assert run([*words, "--contact-friction", "0.35", "--quiet"]) == 0

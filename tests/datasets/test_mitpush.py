@@ -86,7 +86,7 @@ def final_errors(store: Store, name: str) -> dict[str, tuple[float, float]]:
 
 
 @pytest.mark.recorded
-def test_every_push_is_there_in_its_group(recorded: Store):
+def test_every_push_is_in_its_group(recorded: Store):
     info = recorded.info
     assert (info.kind, info.engine, info.bodies) == ("robot", "recorded", 1)
     assert (info.pushes, info.steps, info.time_step) == (805, 1200, 1 / 240)
@@ -113,7 +113,7 @@ def test_repeats_share_a_number(recorded: Store, table: list):
 
 
 @pytest.mark.recorded
-def test_the_ends_are_those_of_the_table(recorded: Store, table: list):
+def test_end_poses_are_those_of_the_table(recorded: Store, table: list):
     arrays = recorded.read(slice(None))
     before = columns(table, "obj_x0", "obj_y0", "obj_th0")
     after = columns(table, "obj_x1", "obj_y1", "obj_th1")
@@ -130,7 +130,7 @@ def test_the_ends_are_those_of_the_table(recorded: Store, table: list):
 
 
 @pytest.mark.recorded
-def test_nothing_but_the_last_pose_counts_as_observed(recorded: Store):
+def test_only_the_last_pose_is_observed(recorded: Store):
     arrays = recorded.read(slice(None))
     np.testing.assert_array_equal(arrays["pose_observed"].sum(axis=1), 1)
     known = np.isfinite(arrays["truth"])
@@ -143,7 +143,7 @@ def test_nothing_but_the_last_pose_counts_as_observed(recorded: Store):
 
 
 @pytest.mark.recorded
-def test_the_pusher_goes_straight_and_then_holds(recorded: Store, table: list):
+def test_the_pusher_moves_straight_and_then_holds(recorded: Store, table: list):
     arrays = recorded.read(slice(None))
     where, velocity = arrays["command_position"], arrays["command_velocity"]
     np.testing.assert_array_equal(arrays["truth_pusher"], where)
@@ -164,7 +164,7 @@ def test_the_pusher_goes_straight_and_then_holds(recorded: Store, table: list):
 
 
 @pytest.mark.recorded
-def test_the_disk_is_the_one_of_the_data(recorded: Store):
+def test_the_disk_is_the_recorded_disk(recorded: Store):
     arrays = recorded.read(slice(0, 3))
     for name, value in {
         **{"mass": 0.8937, "radius": 0.0525, "pusher_radius": 0.00475},
@@ -181,7 +181,7 @@ def test_the_published_model_has_its_published_errors(recorded: Store):
 
 
 @pytest.mark.recorded
-def test_physics_comes_as_near_as_it_has_to(recorded: Store):
+def test_physics_has_the_expected_errors(recorded: Store):
     found = final_errors(recorded, "simulated_planar")
     for group, most in zip(GROUPS, (2.9, 2.85, 2.6), strict=True):
         assert 1.0 < found[group][0] < most
@@ -189,9 +189,7 @@ def test_physics_comes_as_near_as_it_has_to(recorded: Store):
 
 
 @pytest.mark.recorded
-def test_an_authors_log_gives_the_same_pushes(
-    tmp_path: Path, recorded: Store, table: list
-):
+def test_a_mat_log_gives_the_same_pushes(tmp_path: Path, recorded: Store, table: list):
     rows = [row for row in table if row["surface"] == "plywood"]
     records = np.empty((len(rows), 1), object)
     for index, row in enumerate(rows):
@@ -233,7 +231,7 @@ def test_other_surfaces_and_speeds_make_groups_and_steps(small: Path, tmp_path: 
     assert published == pytest.approx(2 * np.pi - 3.0, abs=1e-6)
 
 
-def test_the_folder_says_what_it_was_made_from(small: Path, tmp_path: Path):
+def test_the_manifest_names_the_source(small: Path, tmp_path: Path):
     out = tmp_path / "new" / "out"
     import_endpoints(small, out)
     config = json.loads((out / "config.json").read_text())
@@ -245,7 +243,7 @@ def test_the_folder_says_what_it_was_made_from(small: Path, tmp_path: Path):
     assert [p.name for p in out.parent.iterdir()] == ["out"]
 
 
-def test_the_same_again_changes_nothing_and_other_settings_are_refused(
+def test_equal_settings_change_nothing_and_others_are_refused(
     small: Path, tmp_path: Path
 ):
     out = tmp_path / "out"
@@ -261,13 +259,13 @@ def test_the_same_again_changes_nothing_and_other_settings_are_refused(
     assert (out / "hashes.json").stat().st_mtime_ns == stamp
 
 
-def test_the_same_input_gives_the_same_bytes(small: Path, tmp_path: Path):
+def test_equal_input_gives_equal_bytes(small: Path, tmp_path: Path):
     for name in ("one", "two"):
         import_endpoints(small, tmp_path / name)
     assert tree(tmp_path / "one") == tree(tmp_path / "two")
 
 
-def test_what_is_no_run_is_left_alone(small: Path, tmp_path: Path):
+def test_foreign_folders_stay_unchanged(small: Path, tmp_path: Path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "letter.txt").write_text("dear")
     with pytest.raises(RunConflict, match="is not empty"):
@@ -282,7 +280,7 @@ def test_an_empty_folder_is_filled(small: Path, tmp_path: Path):
     assert import_endpoints(small, tmp_path / "out").info.pushes == 2
 
 
-def test_a_store_that_lost_its_end_is_made_again(small: Path, tmp_path: Path):
+def test_an_unfinished_store_is_made_again(small: Path, tmp_path: Path):
     out = tmp_path / "out"
     import_endpoints(small, out)
     before = tree(out)
@@ -302,9 +300,7 @@ def test_bad_input_leaves_nothing_behind(small: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])
-def test_a_friction_that_cannot_be_is_refused(
-    small: Path, tmp_path: Path, value: float
-):
+def test_an_impossible_friction_is_refused(small: Path, tmp_path: Path, value: float):
     with pytest.raises(BadInput, match="`contact_friction` is"):
         import_endpoints(small, tmp_path / "out", contact_friction=value)
     with pytest.raises(BadInput, match="^`table_friction` is"):

@@ -116,7 +116,7 @@ def test_columns_may_come_in_any_order_with_others_between_and_blank_lines(tmp_p
 
 
 @pytest.mark.recorded
-def test_an_authors_log_reads_as_the_same_rows_of_the_table(
+def test_a_mat_log_has_the_rows_of_the_table(
     tmp_path: Path, recorded_pushes_folder: Path
 ):
     with (recorded_pushes_folder / "ellip1_endpoints.csv").open(newline="") as file:
@@ -148,7 +148,7 @@ def test_the_real_log_of_a_square_is_read_whole(recorded_pushes_folder: Path):
     assert 0.0494 < stroke.min() < stroke.max() < 0.0507
 
 
-def test_a_missing_file_says_where_the_pushes_come_from(tmp_path: Path):
+def test_a_missing_file_names_the_source_of_the_pushes(tmp_path: Path):
     for path in (tmp_path, tmp_path / "ellip1_endpoints.csv", tmp_path / "no" / "dir"):
         with pytest.raises(BadTable, match="robinzhoucmu/Pushing.*eval_logs"):
             read_log(path)
@@ -161,7 +161,7 @@ def test_a_missing_column_is_named(tmp_path: Path, name: str):
     assert f"column {name} is missing" in refusal(path)
 
 
-def test_a_column_that_is_there_twice_is_refused(tmp_path: Path):
+def test_a_duplicate_column_is_refused(tmp_path: Path):
     path = write_csv(tmp_path / "t.csv", {})
     text = path.read_text().replace("surface,", "surface,obj_x0,")
     path.write_text(text.replace("abs,", "abs,0.3,"))
@@ -201,7 +201,7 @@ def test_a_bad_value_is_named_with_its_row(tmp_path: Path, row: dict, parts: lis
         assert part in message
 
 
-def test_a_cut_row_and_a_long_one_are_named(tmp_path: Path):
+def test_short_and_long_rows_are_named(tmp_path: Path):
     path = write_csv(tmp_path / "t.csv", {}, {}, {})
     whole = path.read_bytes()
     path.write_bytes(whole[:-30])
@@ -211,13 +211,13 @@ def test_a_cut_row_and_a_long_one_are_named(tmp_path: Path):
     assert "row 2: has 19 fields, not 18" in refusal(path)
 
 
-def test_a_quote_that_never_closes_is_refused(tmp_path: Path):
+def test_an_unclosed_quote_is_refused(tmp_path: Path):
     path = write_csv(tmp_path / "t.csv", {}, {}, {})
     path.write_text(path.read_text().replace("abs", '"abs', 1))
     refusal(path)
 
 
-def test_no_rows_no_content_and_no_text_are_refused(tmp_path: Path):
+def test_empty_and_binary_files_are_refused(tmp_path: Path):
     assert "no rows" in refusal(write_csv(tmp_path / "t.csv"))
     empty = tmp_path / "empty.csv"
     empty.touch()
@@ -238,7 +238,7 @@ def test_a_table_without_a_last_line_break_is_read_with_a_warning(
     assert "is it cut?" in caplog.text
 
 
-def test_a_log_cut_anywhere_is_refused(tmp_path: Path):
+def test_a_truncated_log_is_refused(tmp_path: Path):
     path = write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW] * 50)
     whole = path.read_bytes()
     for length in range(0, len(whole) - 1, 7):
@@ -246,7 +246,7 @@ def test_a_log_cut_anywhere_is_refused(tmp_path: Path):
         refusal(path)
 
 
-def test_a_log_with_changed_bytes_never_ends_in_another_error(tmp_path: Path):
+def test_a_log_with_changed_bytes_gives_no_other_error(tmp_path: Path):
     path = write_mat(tmp_path / "abs_ellip1_poly4_v10.mat", [ROW] * 5)
     whole = path.read_bytes()
     rng = np.random.default_rng(0)
@@ -262,14 +262,14 @@ def test_a_log_with_changed_bytes_never_ends_in_another_error(tmp_path: Path):
     assert refused > 100
 
 
-def test_random_bytes_are_no_log(tmp_path: Path):
+def test_random_bytes_are_refused(tmp_path: Path):
     path = tmp_path / "abs_ellip1_poly4_v10.mat"
     path.write_bytes(np.random.default_rng(1).bytes(5000))
     assert "damaged or not a MATLAB file" in refusal(path)
 
 
 @pytest.mark.parametrize("field", FIELDS)
-def test_a_log_that_lacks_a_field_is_refused(tmp_path: Path, field: str):
+def test_a_log_without_a_field_is_refused(tmp_path: Path, field: str):
     records = np.empty((1, 1), object)
     names = {f: n for f, n in FIELDS.items() if f != field}
     records[0, 0] = {f: np.array([[ROW[c]] for c in n]) for f, n in names.items()}
@@ -296,7 +296,7 @@ def test_a_log_with_wrong_sizes_kinds_or_values_is_refused(tmp_path: Path):
     assert "record_all[0]: init_pose_gt is missing" in refusal(path)
 
 
-def test_the_name_of_a_log_has_to_say_what_it_is(tmp_path: Path):
+def test_the_name_of_a_log_gives_its_conditions(tmp_path: Path):
     assert "SURFACE_SHAPE_MODEL" in refusal(write_mat(tmp_path / "log.mat", [ROW]))
     path = tmp_path / "abs_ellip1_poly4_v10.mat"
     good = write_mat(path, [ROW], shape_id="ellip1", vel=10)

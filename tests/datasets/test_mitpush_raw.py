@@ -53,7 +53,7 @@ def imported(tmp_path_factory: pytest.TempPathFactory):
     return import_mitpush(tree, folder / "out")
 
 
-def test_what_comes_out_is_the_motion_that_went_in(imported):
+def test_imported_motion_equals_the_recorded_motion(imported):
     arrays = imported.read(slice(0, 1))
     truth = arrays["truth"][0, :238, 0]
     np.testing.assert_allclose(truth[:, :2], path_of(WITHIN)[:, :2], atol=1e-6)
@@ -66,7 +66,7 @@ def test_what_comes_out_is_the_motion_that_went_in(imported):
     np.testing.assert_array_equal(arrays["truth_pusher"], arrays["command_position"])
 
 
-def test_rates_are_smooth_or_unknown(imported):
+def test_velocities_are_smooth_or_unknown(imported):
     arrays = imported.read(slice(None))
     known = arrays["rate_observed"] > 0
     assert known.sum(axis=1).tolist() == [214, 0]  # too short for the filter: none
@@ -79,7 +79,7 @@ def test_rates_are_smooth_or_unknown(imported):
     np.testing.assert_allclose(moving[..., 0], SPEED, rtol=1e-4)
 
 
-def test_beyond_its_end_a_push_holds_and_nothing_is_known(imported):
+def test_steps_beyond_the_end_are_unobserved(imported):
     arrays = imported.read(slice(None))
     assert arrays["steps"].tolist() == [240, 40]
     assert arrays["pose_observed"].sum(axis=1).tolist() == [238, 22]
@@ -91,7 +91,7 @@ def test_beyond_its_end_a_push_holds_and_nothing_is_known(imported):
     assert not arrays["command_velocity"][1, 23:].any()
 
 
-def test_what_was_left_out_is_counted(imported):
+def test_rejected_pushes_are_counted(imported):
     assert skipped(imported.path) == {
         "under 100 bytes": 1,
         "accelerated": 1,
@@ -100,7 +100,7 @@ def test_what_was_left_out_is_counted(imported):
     }
 
 
-def test_the_store_is_like_any_other(imported):
+def test_the_store_is_evaluated_like_any_other(imported):
     info = imported.info
     assert (info.kind, info.engine, info.bodies) == ("robot", "recorded", 1)
     assert info.groups == ("abs-50", "abs-60")
@@ -136,7 +136,7 @@ def test_chunks_do_not_change_what_is_stored(
             np.testing.assert_array_equal(parts[key], whole[key], err_msg=key)
 
 
-def test_json_and_hdf5_give_the_same(tmp_path: Path):
+def test_json_and_hdf5_give_equal_stores(tmp_path: Path):
     pack(tmp_path / "json.zip", {"deep/" + name(): to_json(with_traps())})
     (tmp_path / "h5").mkdir()
     (tmp_path / "h5" / name("h5")).write_bytes(to_hdf5(with_traps()))
@@ -146,7 +146,7 @@ def test_json_and_hdf5_give_the_same(tmp_path: Path):
         np.testing.assert_array_equal(other[key], value, err_msg=key)
 
 
-def test_without_h5py_the_message_says_what_to_install(
+def test_without_h5py_the_message_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
@@ -165,7 +165,7 @@ def test_damaged_hdf5_is_left_out(tmp_path: Path):
     assert skipped(tmp_path / "out") == {"damaged, or not a recording of a push": 3}
 
 
-def test_the_same_push_twice_counts_once(tmp_path: Path):
+def test_duplicate_pushes_count_once(tmp_path: Path):
     tree = tmp_path / "tree"
     pack(tree / "ellip1_json.zip", good())
     pack(tree / "ellip1_h5.zip", {name("h5"): bytes(200)})
@@ -233,7 +233,7 @@ def test_every_unusable_push_is_named_and_counted(
 
 
 @pytest.mark.parametrize("turn", [np.pi / 2, -np.pi / 2, np.pi, 1.5 * np.pi])
-def test_a_jump_of_the_markers_symmetry_is_undone(tmp_path: Path, turn: float):
+def test_symmetric_marker_flips_are_corrected(tmp_path: Path, turn: float):
     files = {name(): changed(values("object_pose", slice(77, None), 3, turn))}
     store = import_mitpush(pack(tmp_path / "a.zip", files), tmp_path / "out")
     yaw = store.read(slice(None))["truth"][0, :238, 0, 2]
@@ -311,7 +311,9 @@ def test_hostile_archives_give_one_line_and_leave_nothing(tmp_path: Path, case: 
     assert [p.name for p in tmp_path.iterdir()] == ["ellip1_json.zip"]
 
 
-def test_all_files_together_have_a_cap(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_total_size_of_files_is_limited(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
     path = pack(tmp_path / "a.zip", {name(rep=i): to_json(recording()) for i in (1, 2)})
     monkeypatch.setattr(archives, "LARGEST_SUM", int(1.5 * len(to_json(recording()))))
     with pytest.raises(BadTable, match="_rep=0002.json' is too large"):
@@ -320,13 +322,15 @@ def test_all_files_together_have_a_cap(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 @pytest.mark.parametrize("path", ["nowhere", "nowhere.zip", "pushes.csv"])
-def test_a_path_that_is_neither_is_refused(tmp_path: Path, path: str):
+def test_a_path_that_is_neither_folder_nor_archive_is_refused(
+    tmp_path: Path, path: str
+):
     (tmp_path / "pushes.csv").write_text("t")
     with pytest.raises(BadTable, match="neither a .zip nor a folder"):
         import_mitpush(tmp_path / path, tmp_path / "out")
 
 
-def test_the_same_input_gives_the_same_bytes_and_other_input_is_refused(
+def test_equal_input_gives_equal_bytes_and_other_input_is_refused(
     tmp_path: Path,
 ):
     path = pack(tmp_path / "ellip1_json.zip", good())
@@ -342,7 +346,7 @@ def test_the_same_input_gives_the_same_bytes_and_other_input_is_refused(
     assert contents(tmp_path / "one") == before
 
 
-def test_an_import_does_not_read_what_it_wrote(tmp_path: Path):
+def test_an_import_does_not_read_its_own_output(tmp_path: Path):
     pack(tmp_path / "ellip1_json.zip", good())
     out = tmp_path / "runs" / "mit"
     for _ in range(2):
@@ -359,7 +363,7 @@ def test_a_disk_far_from_the_pusher_is_left_out(tmp_path: Path):
     assert skipped(tmp_path / "out") == {"a disk moves untouched": 1}
 
 
-def test_a_friction_that_cannot_be_is_refused(tmp_path: Path):
+def test_an_impossible_friction_is_refused(tmp_path: Path):
     path = pack(tmp_path / "ellip1_json.zip", good())
     with pytest.raises(BadInput, match="`contact_friction` is"):
         import_mitpush(path, tmp_path / "out", contact_friction=-1)

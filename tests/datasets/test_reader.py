@@ -48,7 +48,7 @@ def first(reader, count) -> list[list[int]]:
     return [which(reader.batch(i)) for i in range(count)]
 
 
-def test_a_batch_holds_what_the_store_holds(store, make_reader):
+def test_a_batch_contains_the_stored_values(store, make_reader):
     whole = store.read(slice(None), NAMES)
     arrays, steps = make_reader(store).batch(0)
     chosen = which((arrays, steps))
@@ -57,7 +57,7 @@ def test_a_batch_holds_what_the_store_holds(store, make_reader):
         np.testing.assert_array_equal(arrays[name], whole[name][chosen])
 
 
-def test_what_is_not_stored_is_added_to_each_chunk_once(store, make_reader):
+def test_computed_arrays_are_added_to_each_chunk_once(store, make_reader):
     seen = []
 
     def complete(arrays):
@@ -71,7 +71,7 @@ def test_what_is_not_stored_is_added_to_each_chunk_once(store, make_reader):
     assert sum(seen) == PUSHES
 
 
-def test_the_order_depends_on_seed_and_iteration_alone(store, make_reader):
+def test_the_order_depends_only_on_seed_and_iteration(store, make_reader):
     wanted = first(make_reader(store), 12)
     assert first(make_reader(store), 12) == wanted
     assert first(make_reader(store, seed=1), 12) != wanted
@@ -94,7 +94,7 @@ def test_every_epoch_visits_each_push_once_in_another_order(store, make_reader):
     assert len({tuple(epoch) for epoch in epochs}) == 3
 
 
-def test_pushes_kept_for_validation_are_never_read(store, make_reader):
+def test_validation_pushes_are_never_read(store, make_reader):
     seen = sum(first(make_reader(store.first(33)), 12), [])
     assert set(seen) == set(range(33))
 
@@ -136,7 +136,7 @@ def test_memory_is_bounded(store, make_reader):
     assert reader._cache._size <= 2 * chunk
 
 
-def test_the_cache_forgets_what_was_not_used_for_longest(store, monkeypatch):
+def test_the_cache_drops_the_least_recently_used_chunk(store, monkeypatch):
     read = []
     cls = type(store)
     original = cls.read

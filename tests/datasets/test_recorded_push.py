@@ -96,7 +96,7 @@ def test_noise_of_the_poses_does_not_drown_the_rates():
     assert raw.std() > 10 * error.std()
 
 
-def test_a_gap_is_not_made_up_and_rates_keep_clear_of_it():
+def test_gaps_are_neither_interpolated_nor_differentiated():
     time = clock()
     kept = (time <= 0.4) | (time >= 0.6)
     push = resampled(along(time[kept], time[kept]), still(time))
@@ -110,7 +110,7 @@ def test_a_gap_is_not_made_up_and_rates_keep_clear_of_it():
     assert rates.sum() == 240 - (SMOOTHING - 1) - gap.sum() - (SMOOTHING - 1) - 1
 
 
-def test_a_step_that_ends_after_the_recording_is_not_known():
+def test_steps_after_the_recording_are_unknown():
     time = np.append(clock(0.5), 0.5018)  # 120.43 steps
     assert resampled(along(time, time), still(time)).steps == 120
     time = np.append(clock(0.5), 0.503)  # 120.72 steps
@@ -120,7 +120,7 @@ def test_a_step_that_ends_after_the_recording_is_not_known():
     assert push.pusher_velocity.shape == (121, 2)
 
 
-def test_the_clocks_start_where_both_have_begun():
+def test_the_push_starts_where_both_clocks_have_begun():
     disk, tip = clock(1.0, start=1e9), clock(1.0, start=1e9 + 0.1234)
     push = resampled(along(disk, disk - 1e9), still(tip))
     assert push.initial[0, 0] == pytest.approx(0.1234, abs=1e-6)
@@ -203,7 +203,7 @@ def test_a_problem_names_the_sample_and_the_body():
     assert (jump.sample, jump.body) == (99, 1)
 
 
-def test_only_what_is_no_symmetry_of_the_marker_stays():
+def test_marker_symmetries_are_corrected():
     true = np.linspace(3.0, 3.4, 50)
     seen = true + np.repeat([0, np.pi / 2, -np.pi, 2 * np.pi, -np.pi / 2], 10)
     np.testing.assert_allclose(without_symmetry_jumps(seen), true, atol=1e-12)

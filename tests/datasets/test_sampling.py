@@ -58,7 +58,7 @@ def test_disks_touch_and_do_not_overlap(disks):
 
 
 @pytest.mark.parametrize("disks", [3, 5])
-def test_the_pusher_starts_inside_no_disk(disks):
+def test_the_pusher_never_starts_inside_a_disk(disks):
     scene, initial, _ = pushed(GenerateConfig(disks=disks, pushes=1500), 3, 1)
     gaps = pusher_gaps(scene, initial)
     np.testing.assert_allclose(gaps[:, 0], 0, atol=1e-6)
@@ -70,7 +70,7 @@ def test_second_disks_are_in_front_of_the_first():
     assert_uniform(np.arctan2(ahead[:, 1], ahead[:, 0]), -np.pi / 3, np.pi / 3)
 
 
-def test_a_gap_parts_the_disks():
+def test_a_gap_separates_the_disks():
     np.testing.assert_allclose(gaps(drawn(gap_mm=2.0))[:, 0, 1], 0.002, atol=1e-9)
 
 
@@ -86,7 +86,7 @@ def test_a_pusher_without_room_is_refused(monkeypatch):
         drawn(disks=3, pushes=1)
 
 
-def test_each_chunk_draws_its_own():
+def test_each_chunk_has_its_own_draws():
     one, again, other, seed = (
         chunk_generator(*key).random() for key in ((0, 0), (0, 0), (0, 1), (1, 0))
     )

@@ -42,7 +42,7 @@ def test_a_chunk_has_every_array_in_its_shape(setup):
 
 
 @both_setups
-def test_pushes_start_at_rest_and_in_touch(setup):
+def test_pushes_start_at_rest_and_in_contact(setup):
     arrays, info = chunk(setup)
     scene, initial = to_scene(arrays, info), to_initial(arrays)
     assert np.abs(pusher_gaps(scene, initial)[:, 0]).max() < 1e-7
@@ -61,7 +61,7 @@ def test_truth_and_prediction_start_from_the_same_state(setup):
 
 
 @both_setups
-def test_truth_is_the_prediction_where_nothing_differs(setup):
+def test_truth_equals_the_prediction_of_the_same_engine(setup):
     arrays, _ = chunk(setup, noise_level="none", **AS_ASSUMED)
     np.testing.assert_allclose(
         arrays["truth"][..., :3], arrays["simulated_planar"][..., :3], atol=1e-6
@@ -71,7 +71,7 @@ def test_truth_is_the_prediction_where_nothing_differs(setup):
 
 
 @both_setups
-def test_noise_is_of_the_truth_alone(setup):
+def test_noise_acts_only_on_the_truth(setup):
     quiet, _ = chunk(setup, noise_level="none")
     noisy, _ = chunk(setup)
     np.testing.assert_array_equal(quiet["simulated_planar"], noisy["simulated_planar"])
@@ -115,7 +115,7 @@ def test_the_paper_records_200_steps():
 # Batches.
 
 
-def test_batches_hold_what_was_stored():
+def test_batches_contain_the_stored_values():
     arrays, info = chunk()
     batch = to_batch(arrays, info, steps=30, simulated="planar")
     assert batch.size == 12
@@ -136,7 +136,7 @@ def test_steps_beyond_a_push_are_not_observed():
     assert not observed.all()
 
 
-def test_batches_of_force_driven_pushes_know_the_pusher():
+def test_batches_of_force_driven_pushes_have_the_pusher():
     arrays, info = chunk("direct-force")
     controls = to_controls(arrays, info)
     assert isinstance(controls, ForceControls)

@@ -47,15 +47,15 @@ def edit_attributes(folder, change):
     )
 
 
-def test_a_missing_store_says_how_to_make_one(tmp_path):
+def test_a_missing_store_names_the_command_that_makes_one(tmp_path):
     assert "sainet generate" in refusal(tmp_path / "none")
 
 
-def test_a_name_that_no_folder_can_have_is_refused(tmp_path):
+def test_an_impossible_folder_name_is_refused(tmp_path):
     assert "cannot be read" in refusal(tmp_path / ("x" * 300))
 
 
-def test_an_unfinished_store_says_how_to_go_on(copy):
+def test_an_unfinished_store_names_the_command_that_resumes(copy):
     (copy / "hashes.json").unlink()
     message = refusal(copy)
     assert "hashes.json" in message
@@ -84,7 +84,7 @@ def test_a_flipped_byte_is_found(copy):
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "\x00\xff", '{"files": {}}'])
-def test_a_list_of_hashes_that_is_none_is_refused(copy, text):
+def test_an_invalid_list_of_hashes_is_refused(copy, text):
     (copy / "hashes.json").write_text(text)
     assert "hashes.json" in refusal(copy)
 
@@ -114,13 +114,13 @@ def test_newer_attributes_ask_for_a_newer_sainet(copy):
 
 
 @pytest.mark.parametrize("version", [None, "1", 0, -1, 1.5, [1]])
-def test_a_version_that_never_was_is_refused(copy, version):
+def test_an_unknown_version_is_refused(copy, version):
     edit(copy / "hashes.json", lambda found: found.update(format_version=version))
     assert "format_version is" in refusal(copy)
 
 
 @pytest.mark.parametrize("attributes", [[], None, 3])
-def test_attributes_that_are_none_are_refused(copy, attributes):
+def test_invalid_attributes_are_refused(copy, attributes):
     edit(copy / ATTRIBUTES, lambda found: found.update(attributes=attributes))
     assert f"{ATTRIBUTES}: attributes are missing" in refusal(copy)
 
@@ -136,7 +136,7 @@ def test_a_missing_attribute_is_named(copy, name):
 @pytest.mark.parametrize(
     "damage", [{"bodies": 3}, {"pushes": 29}, {"assumed_engines": ["bullet"]}]
 )
-def test_attributes_that_do_not_fit_the_arrays_are_refused(copy, damage):
+def test_attributes_that_contradict_the_arrays_are_refused(copy, damage):
     edit_attributes(copy, lambda found: found.update(damage))
     refusal(copy)
 
@@ -152,7 +152,7 @@ def test_attributes_that_do_not_fit_the_arrays_are_refused(copy, damage):
         {"assumed_engines": 5},
     ],
 )
-def test_attributes_that_make_no_sense_are_refused(copy, damage):
+def test_impossible_attributes_are_refused(copy, damage):
     edit_attributes(copy, lambda found: found.update(damage))
     assert ATTRIBUTES in refusal(copy)
 
@@ -168,7 +168,7 @@ def test_a_part_is_read_as_it_was_written(whole_store):
         assert values.dtype == np.float32
 
 
-def test_xarray_sees_dimensions_and_units(whole_store):
+def test_xarray_reads_dimensions_and_units(whole_store):
     store = open_store(whole_store)
     assert store.first(3).to_xarray().sizes["push"] == 3
     dataset = store.to_xarray()
@@ -189,7 +189,7 @@ def test_content_changes_with_the_store(whole_store, copy):
     assert open_store(copy).content != before
 
 
-def test_who_says_nothing_of_repeats_has_none(copy):
+def test_repeats_default_to_unique(copy):
     def forget(found: dict) -> None:
         del found["has_repeats"]
 

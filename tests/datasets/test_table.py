@@ -44,7 +44,7 @@ def imported(tmp_path_factory: pytest.TempPathFactory):
     return import_table(*write(folder / "in", to_csv(mixed, GROUPED)), folder / "out")
 
 
-def test_what_comes_out_is_the_motion_that_went_in(imported):
+def test_imported_motion_equals_the_recorded_motion(imported):
     arrays = imported.read(slice(None))
     for push, steps in enumerate((96, 72)):
         for body, name in enumerate(("far", "near")):  # the order of the TOML
@@ -65,7 +65,7 @@ def test_what_comes_out_is_the_motion_that_went_in(imported):
     np.testing.assert_allclose(rate[known], SPEED["far"], rtol=1e-4)
 
 
-def test_the_store_says_what_the_properties_say(imported):
+def test_the_store_has_the_values_of_the_properties_file(imported):
     info = imported.info
     assert (info.kind, info.engine, info.bodies) == ("robot", "recorded", 2)
     assert info.groups == ("rubber", "wood")
@@ -83,7 +83,7 @@ def test_the_store_says_what_the_properties_say(imported):
     assert config["bodies"] == ["far", "near"]
 
 
-def test_what_lies_in_a_long_gap_is_not_made_up(tmp_path: Path):
+def test_long_gaps_are_not_interpolated(tmp_path: Path):
     table, bodies = write(tmp_path, to_csv(rows(rate=2.5, duration=2.0)))
     arrays = import_table(table, bodies, tmp_path / "out").read(slice(None))
     seen = np.flatnonzero(arrays["pose_observed"][0])
@@ -105,7 +105,7 @@ def test_angles_may_be_wrapped_and_frictions_left_out(tmp_path: Path):
     assert arrays["pusher_friction"] == pytest.approx(0.4)
 
 
-def test_the_same_input_gives_the_same_bytes_and_other_input_is_refused(
+def test_equal_input_gives_equal_bytes_and_other_input_is_refused(
     tmp_path: Path,
 ):
     table, bodies = write(tmp_path / "in", to_csv(rows()))
@@ -232,7 +232,7 @@ def test_hostile_tables_give_one_line_with_the_row_and_leave_nothing(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bodies.toml", "pushes.csv"]
 
 
-def test_degrees_of_small_turns_are_recognised_by_what_moves(tmp_path: Path):
+def test_degrees_of_small_rotations_are_recognised(tmp_path: Path):
     """Ten degrees, given as ten: never beyond twenty, and no sample jumps."""
     table = rows(duration=1.0)
     for k, row in enumerate(table):
@@ -368,7 +368,7 @@ def test_disks_that_overlap_have_a_wrong_radius(tmp_path: Path, radius: str):
         import_table(table, bodies, tmp_path / "out")
 
 
-def test_files_that_are_none_are_refused(tmp_path: Path):
+def test_unusable_files_and_frictions_are_refused(tmp_path: Path):
     table, bodies = write(tmp_path, to_csv(rows()))
     for path in (tmp_path / "no.csv", tmp_path, tmp_path / "no.parquet"):
         with pytest.raises(BadTable, match=str(path)):
@@ -391,7 +391,7 @@ def as_parquet(tmp_path: Path, data: bytes) -> tuple[Path, Path]:
     return path, bodies
 
 
-def test_parquet_gives_the_same_as_csv(tmp_path: Path):
+def test_parquet_and_csv_give_equal_stores(tmp_path: Path):
     needs_parquet()
     table = [[*row, "wood"] for row in rows("7") + rows("3")]
     one = import_table(*write(tmp_path, to_csv(table, GROUPED)), tmp_path / "one")
@@ -442,7 +442,7 @@ def test_hostile_parquet_gives_one_line(tmp_path: Path, case: str):
     assert not (tmp_path / "out").exists()
 
 
-def test_without_pyarrow_the_message_says_what_to_install(
+def test_without_pyarrow_the_message_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setitem(sys.modules, "pyarrow", None)

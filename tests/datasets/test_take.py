@@ -13,7 +13,7 @@ def store(tmp_path):
     return write(tmp_path / "data", info, made_up(info))
 
 
-def test_the_first_pushes_are_those_of_the_whole(store):
+def test_the_first_pushes_equal_those_of_the_store(store):
     few = store.first(7)
     assert (few.info.pushes, few.info.chunks) == (7, 2)
     for part in (slice(None), slice(5, 99), slice(-2, None)):
@@ -22,14 +22,14 @@ def test_the_first_pushes_are_those_of_the_whole(store):
             np.testing.assert_array_equal(array, wanted[name][part])
 
 
-def test_other_pushes_are_other_content(store):
+def test_other_pushes_have_another_content_hash(store):
     contents = {store.first(n).content for n in (1, 7, 12)}
     assert len(contents) == 3
     assert store.first(12).content == store.content
 
 
 @pytest.mark.parametrize("pushes", [0, -1, 13])
-def test_a_store_has_no_more_than_it_has(store, pushes):
+def test_more_pushes_than_stored_are_refused(store, pushes):
     with pytest.raises(BadInput, match=f"has 12 pushes, not {pushes}"):
         store.first(pushes)
 
@@ -48,7 +48,7 @@ def test_any_pushes_can_be_taken_in_any_order_and_again(store):
     )
 
 
-def test_what_is_taken_decides_the_content(store):
+def test_the_content_hash_depends_on_the_taken_pushes(store):
     contents = {store.take(rows).content for rows in ([0, 1], [1, 0], [0, 2], [3])}
     assert len(contents) == 4
     assert store.take([0, 1]).content == store.first(2).content
@@ -60,6 +60,6 @@ def test_what_is_taken_decides_the_content(store):
 @pytest.mark.parametrize(
     ("rows", "says"), [([], "no push is left"), ([0, 12], "no push 12"), ([-1], "-1")]
 )
-def test_only_pushes_that_are_there_can_be_taken(store, rows, says):
+def test_only_stored_pushes_can_be_taken(store, rows, says):
     with pytest.raises(BadInput, match=says):
         store.take(rows)

@@ -69,6 +69,6 @@ def test_rolls_out_in_the_assumed_scene():
     assert np.abs(found.position - true.position).max() > 1e-4
 
 
-def test_an_unknown_engine_names_the_known_ones():
+def test_an_unknown_engine_lists_the_available_engines():
     with pytest.raises(UnknownName, match="'plannar'. Available: .*planar"):
         make_engine("plannar")

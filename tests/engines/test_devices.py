@@ -19,7 +19,7 @@ def test_tests_run_on_two_devices():
 
 @pytest.mark.parametrize("most", [None, 1, 3])
 @pytest.mark.parametrize("size", [1, 2, 5, 8])
-def test_any_batch_size_is_split_and_put_together_again(size, most):
+def test_any_batch_size_is_split_and_joined(size, most):
     batch = jnp.arange(size, dtype=jnp.float32)
     more = jnp.ones((size, 3)) * batch[:, None]
     shared = {"factor": jnp.asarray(2.0)}
@@ -28,12 +28,12 @@ def test_any_batch_size_is_split_and_put_together_again(size, most):
     np.testing.assert_array_equal(found["sum"], 3 * np.arange(size))
 
 
-def test_both_devices_take_part():
+def test_both_devices_compute():
     seen = over_devices(_device_of_each, {}, jnp.zeros(4))
     np.testing.assert_array_equal(seen, [0, 0, 1, 1])
 
 
-def test_a_device_works_on_a_few_rows_at_a_time():
+def test_a_device_computes_a_few_rows_at_a_time():
     seen = over_devices(_rows_at_once, {}, jnp.zeros(10), most=2)
     np.testing.assert_array_equal(seen, [2] * 10)
 

@@ -108,11 +108,11 @@ def test_both_solvers_agree(monkeypatch, bodies, setup):
     np.testing.assert_allclose(other.angle, as_chosen.angle, atol=2e-4)
 
 
-def test_contact_budget_is_that_of_a_planar_graph():
+def test_the_contact_budget_is_that_of_a_planar_graph():
     assert [contact_budget(n) for n in range(2, 9)] == [1, 3, 6, 9, 12, 15, 18]
 
 
-def test_more_sweeps_keep_five_disks_from_sinking_in():
+def test_more_sweeps_reduce_the_overlap_of_five_disks():
     config = GenerateConfig(disks=5, pushes=32)
     scene, *push = pushed(config, 1, 80)
     deepest = []

@@ -54,6 +54,6 @@ def test_impossible_values_are_refused_with_their_field(text: str, field: str):
         msgspec.json.decode(text, type=SimulatorSpec)
 
 
-def test_an_unknown_name_lists_the_known_ones():
+def test_an_unknown_name_lists_the_available_names():
     with pytest.raises(UnknownName, match="planar-true"):
         simulator_named("planar-exact")

@@ -87,9 +87,7 @@ def errors_at_rest(store, limit, shift=0.0):
 
 
 @pytest.mark.parametrize(("steps", "limit"), [(None, 12), (0, 12), (12, 12), (6, 6)])
-def test_pushes_of_mixed_length_come_back_in_the_order_of_the_store(
-    simulated, steps, limit
-):
+def test_pushes_of_mixed_length_keep_the_order_of_the_store(simulated, steps, limit):
     told = []
     found = evaluate(
         [resting(shift=0.001)],
@@ -104,7 +102,7 @@ def test_pushes_of_mixed_length_come_back_in_the_order_of_the_store(
     assert sum(pushes for _, pushes in told) == PUSHES
 
 
-def test_groups_are_averaged_apart(simulated):
+def test_groups_have_separate_means(simulated):
     found = evaluate([resting()], simulated)
     mean, _, _ = errors_at_rest(simulated, 12)
     rows = found.to_dict()["rows"]
@@ -152,13 +150,13 @@ def test_recorded_pushes_have_final_errors_beside_published_ones(recorded):
     assert not [name for name in published if name.endswith("_interval")]
 
 
-def test_what_was_not_seen_within_the_steps_is_unknown_not_zero(recorded):
+def test_unobserved_errors_are_nan_not_zero(recorded):
     found = evaluate([resting()], recorded, steps=8)
     known = np.isfinite(found.errors["rest"].final_pos_mm[:, 0])
     np.testing.assert_array_equal(known, LENGTHS <= 8)
 
 
-def test_physics_that_knows_everything_makes_no_error(tmp_path_factory):
+def test_the_true_engine_has_no_error(tmp_path_factory):
     store = quiet_store(tmp_path_factory.getbasetemp())
     exact = AssumedProperties(make_engine("planar"), Assumptions())
     truth = ModelId(kind="physics", name="truth")
@@ -182,14 +180,14 @@ CARD = Card(
 )
 
 
-def test_a_network_is_not_used_on_other_pushes_unless_forced(simulated):
+def test_networks_are_refused_on_other_pushes_unless_forced(simulated):
     card = structs.replace(CARD, kind="direct-force")
     with pytest.raises(BadCheckpoint, match="kind is 'direct-force'"):
         evaluate([resting(card=card)], simulated)
     evaluate([resting(card=card)], simulated, force=True)
 
 
-def test_recorded_pushes_of_the_training_are_no_test(recorded):
+def test_recorded_training_pushes_are_refused_as_test_pushes(recorded):
     seen = digests_to_text(recorded.first(3).push_hashes())
     card = structs.replace(CARD, pushes=seen)
     with pytest.raises(BadCheckpoint, match=rf"trained on 3 of these {PUSHES}.*split"):

@@ -42,7 +42,7 @@ def test_another_seed_draws_other_folds():
     assert (fold_of_push(REPEATS, 3, 0) != fold_of_push(REPEATS, 3, 1)).any()
 
 
-def test_the_errors_of_all_folds_are_those_of_the_whole_in_its_order(store):
+def test_errors_of_all_folds_follow_the_order_of_the_store(store):
     models = [load_model("physics")]
     folds = make_folds(store, 3)
     joined = join_folds([(fold, evaluate(models, fold.tests)) for fold in folds[::-1]])

@@ -6,7 +6,7 @@ import pytest
 from sainet.evaluation.intervals import mean_interval
 
 
-def test_pushes_of_one_fold_rise_and_fall_together():
+def test_pushes_of_one_fold_are_correlated():
     """Folds that differ by nothing but their mean: resampling pushes misses it."""
     rng = np.random.default_rng(0)
     folds = tuple(np.repeat(np.arange(5), 40).tolist())
@@ -18,7 +18,7 @@ def test_pushes_of_one_fold_rise_and_fall_together():
         assert high[0] - low[0] == pytest.approx(2 * 1.96 * deviation, rel=0.15)
 
 
-def test_of_folds_that_are_alike_both_say_nearly_the_same():
+def test_intervals_of_equal_folds_are_nearly_equal():
     values = np.random.default_rng(1).normal(0, 1, (200, 1))
     folds = tuple((np.arange(200) % 5).tolist())
     apart, together = (

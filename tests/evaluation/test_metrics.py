@@ -70,7 +70,7 @@ def test_errors_are_those_of_plain_loops(poses):
         ((0, 0, 6 * np.pi), "rot_deg", 0),
     ],
 )
-def test_a_shift_or_a_turn_is_the_error(poses, shift, name, wanted):
+def test_a_translation_or_rotation_is_the_error(poses, shift, name, wanted):
     _, true, observed = poses
     errors = push_errors(true + np.array(shift), true, observed)
     other = "rot_deg" if name == "pos_mm" else "pos_mm"
@@ -79,7 +79,7 @@ def test_a_shift_or_a_turn_is_the_error(poses, shift, name, wanted):
         np.testing.assert_allclose(getattr(errors, prefix + other), 0, atol=1e-6)
 
 
-def test_either_side_of_half_a_turn_is_near():
+def test_angles_wrap_at_half_a_turn():
     predicted, true = np.zeros((2, 1, 1, 1, 3))
     predicted[..., 2], true[..., 2] = np.deg2rad(179), np.deg2rad(-181 + 360 + 2)
     errors = push_errors(predicted, true, np.ones((1, 1), bool))
@@ -89,7 +89,7 @@ def test_either_side_of_half_a_turn_is_near():
     assert errors.rot_deg[0, 0] == pytest.approx(2)
 
 
-def test_a_push_that_nobody_saw_has_unknown_errors(poses):
+def test_unobserved_pushes_have_unknown_errors(poses):
     predicted, true, observed = poses
     observed[3] = False
     errors = push_errors(predicted, np.full_like(true, np.nan), observed)
@@ -101,14 +101,14 @@ def test_a_push_that_nobody_saw_has_unknown_errors(poses):
     assert np.isfinite(np.delete(ends, 3, axis=0)).all()
 
 
-def test_final_poses_are_the_last_that_were_seen(poses):
+def test_final_poses_are_the_last_observed_poses(poses):
     _, true, observed = poses
     for push, pose in enumerate(final_pose(true, observed)):
         last = max(np.flatnonzero(observed[push]))
         np.testing.assert_array_equal(pose, true[push, last])
 
 
-def test_errors_of_final_poses_alone(poses):
+def test_errors_of_final_poses(poses):
     true = poses[1][:, 0]
     errors = final_errors(true + np.array([0.0, 0.002, np.deg2rad(3)]), true)
     np.testing.assert_allclose(errors.final_pos_mm, 2)
@@ -117,7 +117,7 @@ def test_errors_of_final_poses_alone(poses):
     assert np.isnan(errors.rot_deg).all()
 
 
-def test_travel_is_the_way_between_the_ends():
+def test_travel_is_the_distance_between_the_ends():
     start = np.array([[[1.0, 2.0, 0.0]]])
     end = np.array([[[1.003, 2.004, 9.0]]])
     np.testing.assert_allclose(travel_mm(start, end), [[5.0]])
@@ -177,7 +177,7 @@ def test_intervals_are_the_same_every_time():
         np.testing.assert_array_equal(one, other)
 
 
-def test_what_is_not_known_has_no_interval_and_leaves_the_others_theirs():
+def test_unknown_values_have_no_interval():
     values = np.random.default_rng(2).normal(size=(20, 3))
     whole = mean_interval(values)
     values[4, 1] = np.nan
@@ -249,7 +249,7 @@ def test_pooled_trainings_are_one_model():
     np.testing.assert_array_equal(few.rot_deg[2], parts[2].rot_deg[:4])
 
 
-def test_a_model_against_itself_differs_by_nothing():
+def test_a_model_does_not_differ_from_itself():
     errors = errors_of(np.random.default_rng(5).uniform(size=(10, 2)))
     rows = comparison_rows(("a", errors), ("b", errors), group=None)
     assert len(rows) == 2 * len(METRICS)

@@ -84,7 +84,7 @@ def found(store):
     return identify(store)
 
 
-def test_the_values_of_the_world_are_found_within_their_intervals(found):
+def test_intervals_contain_the_true_values(found):
     for estimate in found.estimates:
         if estimate.name in TRUE:
             true = TRUE[estimate.name]
@@ -116,7 +116,7 @@ def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(store, monkeyp
     np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.12)
 
 
-def test_what_the_data_cannot_tell_is_said_and_stays(found):
+def test_unidentifiable_parameters_keep_their_initial_values(found):
     (table,) = [e for e in found.estimates if e.name == "table_friction"]
     # A pushed disk goes the same way on any table, as long as it does not coast.
     assert table.doubt is not None
@@ -139,7 +139,7 @@ def apart(tmp_path_factory):
     return generate(config, tmp_path_factory.mktemp("apart") / "data")
 
 
-def test_what_no_push_tells_is_doubted_and_stays(apart):
+def test_parameters_without_effect_keep_their_initial_values(apart):
     found = {estimate.name: estimate for estimate in identify(apart).estimates}
     between = found["disk_friction"]
     assert "too few pushes depend on it" in between.doubt
@@ -148,13 +148,13 @@ def test_what_no_push_tells_is_doubted_and_stays(apart):
     assert not any(found[name].doubt for name in OFFSET)
 
 
-def test_few_pushes_tell_nothing(apart):
+def test_fewer_than_four_pushes_identify_nothing(apart):
     for estimate in identify(apart.first(3)).estimates:
         assert "too few pushes depend on it" in estimate.doubt
         assert estimate.value == estimate.start
 
 
-def test_one_disk_touches_no_other(store):
+def test_one_disk_has_no_disk_friction(store):
     scene = samples(store)[0].batch.scene
     assert "disk_friction" not in names_for(scene)
 
@@ -173,7 +173,7 @@ def test_slopes_are_those_of_finite_differences(store):
         assert close.mean() > 0.9  # contact has kinks
 
 
-def test_it_is_a_model_wherever_one_is_expected(store, tmp_path):
+def test_the_folder_is_accepted_as_a_model(store, tmp_path):
     out, tried = tmp_path / "mine", []
     result = identify_into(store, out, on_try=tried.append)
     assert tried[-1] < tried[0]
@@ -258,13 +258,13 @@ def test_a_damaged_file_is_named(tmp_path, text, says):
         ("camera_y_mm", -4.99, -5.0, -4.0, "search range, -5 to 5"),
     ],
 )
-def test_a_wide_interval_is_doubted(name, value, low, high, says):
+def test_a_wide_interval_is_not_identifiable(name, value, low, high, says):
     found = doubt(name, value, low, high)
     assert (says in found) if says else found is None
     assert from_coordinate(name, to_coordinate(name, value)) == pytest.approx(value)
 
 
-def test_scenes_without_friction_are_refused_and_nothing_stays(store, tmp_path):
+def test_scenes_without_friction_are_refused_without_output(store, tmp_path):
     arrays = store.read(slice(None)) | {"table_friction": np.zeros(24, np.float32)}
     slippery = write(tmp_path / "data", store.info, arrays)
     with pytest.raises(BadStore, match="table_friction is 0; .* with a positive one"):
@@ -272,7 +272,7 @@ def test_scenes_without_friction_are_refused_and_nothing_stays(store, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_not_identified_is_the_scenes():
+def test_other_parameters_are_those_of_the_scene():
     engine = to_engine({"pusher_friction": 0.3}).simulator.build()
     scene = with_values(samples_scene(), {})[0]
     believed = engine.assume(scene)
@@ -286,7 +286,7 @@ def samples_scene():
     return to_scene(made_up(info), info)
 
 
-def test_pushes_that_nothing_can_be_learned_from_are_refused(tmp_path):
+def test_unobserved_and_force_driven_pushes_are_refused(tmp_path):
     info = info_of(3)
     arrays = made_up(info)
     blind = arrays | {"pose_observed": 0 * arrays["pose_observed"]}
@@ -295,7 +295,7 @@ def test_pushes_that_nothing_can_be_learned_from_are_refused(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_pushes_of_all_lengths_and_looks_count_alike(tmp_path, caplog):
+def test_pushes_of_all_lengths_have_equal_weight(tmp_path, caplog):
     """Of the short ones the end alone was seen, of the long ones every step."""
     info = info_of(8, bodies=1)
     arrays = made_up(info, lengths=[8] * 4 + [12] * 4)
@@ -310,14 +310,14 @@ def test_pushes_of_all_lengths_and_looks_count_alike(tmp_path, caplog):
     assert found.before_mm > 0
 
 
-def test_alike_frictions_are_the_start_to_the_bit():
+def test_equal_frictions_are_exactly_the_initial_value():
     friction = jnp.full(256, 0.15, jnp.float32)  # whose mean rounds to another number
     scenes = [eqx.tree_at(lambda s: s.table_friction, samples_scene(), friction)]
     one, more = (starting_values(scenes * n, ("table_friction",)) for n in (1, 3))
     assert one == more == {"table_friction": float(jnp.mean(friction))}
 
 
-def test_a_group_that_is_not_there_lists_those_that_are(tmp_path):
+def test_an_unknown_group_lists_the_available_groups(tmp_path):
     info = info_of(4, groups=("abs", "wood"))
     arrays = made_up(info) | {"group": np.array([0, 1, 1, 0])}
     store = write(tmp_path / "data", info, arrays)

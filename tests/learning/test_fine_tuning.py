@@ -60,7 +60,7 @@ def layers(folder):
     return jax.tree.leaves(load_network(folder)[0])
 
 
-def test_training_goes_on_from_the_network_and_says_so(store, start, tmp_path):
+def test_fine_tuning_starts_from_the_network_and_records_it(store, start, tmp_path):
     out = tmp_path / "out"
     fit("sain", store, TUNING, out, start_from=str(start / "sain"))
     card, before = read_card(out), read_card(start / "sain")
@@ -86,7 +86,7 @@ def load(folder):
     return Start(*load_network(folder), folder)
 
 
-def test_a_network_learns_to_see_the_place(store, start, tmp_path):
+def test_a_network_learns_from_table_features(store, start, tmp_path):
     out = tmp_path / "out"
     seeing = replace(TUNING, features="place", validation_share=0.0)
     fit("in", store, seeing, out, start_from=str(start / "in"))
@@ -99,7 +99,7 @@ def test_a_network_learns_to_see_the_place(store, start, tmp_path):
         fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
 
 
-def test_l2_draws_what_is_added_to_the_engine_to_its_first_weights(store, tmp_path):
+def test_l2_pulls_additive_networks_to_their_initial_weights(store, tmp_path):
     drawn = replace(TUNING, validation_share=0.0, average=0, l2=1e6)
     fit("sain", store, drawn, tmp_path / "out", start_from="engine")
     task = Task("sain", store, drawn, PLANAR, from_engine=True)
@@ -111,7 +111,7 @@ def test_l2_draws_what_is_added_to_the_engine_to_its_first_weights(store, tmp_pa
         assert np.abs(one - other).max() < far / 2
 
 
-def test_a_network_that_starts_from_the_engine_goes_on_adding_to_it(store, tmp_path):
+def test_a_fine_tuned_additive_network_stays_additive(store, tmp_path):
     first, on = tmp_path / "first", tmp_path / "on"
     fit("sain", store, TUNING, first, start_from="engine")
     network, card = load_network(first)
@@ -166,7 +166,7 @@ class Stopped(Exception):
     pass
 
 
-def test_an_interrupted_tuning_ends_in_the_same_network(store, start, tmp_path):
+def test_an_interrupted_tuning_gives_the_same_network(store, start, tmp_path):
     patient = replace(TUNING, patience=6)
     words = {"start_from": str(start / "sain")}
     fit("sain", store, patient, tmp_path / "whole", **words)
@@ -198,7 +198,7 @@ def test_validation_pushes_are_drawn_at_random_and_not_trained_on(store):
         assert (len(few.training.rows), len(few.validation.rows)) == (1, 1)
 
 
-def test_repeats_are_validated_on_together_or_not_at_all(tmp_path):
+def test_repeats_stay_together_in_validation(tmp_path):
     info = info_of(40, engine="recorded", seed=None, has_repeats=True)
     repeat = np.random.default_rng(0).permutation(np.repeat(np.arange(8), 5))
     arrays = end_points_alone(made_up(info)) | {"repeat": repeat}
@@ -245,7 +245,7 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     np.testing.assert_allclose(local, trained, rtol=1e-3, atol=2e-5)
 
 
-def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):
+def test_error_terms_are_scaled_by_the_residual(store):
     batch = to_batch(store.read(slice(None)), store.info, simulated="planar")
     found = loss_weights(batch, TUNING)
     last = np.asarray(batch.truth - batch.simulated, np.float64)[:, -1]
@@ -256,7 +256,7 @@ def test_terms_of_errors_weigh_what_the_engine_gets_wrong(store):
     assert (float(found.velocity), float(found.spin)) == (1.0, 1.0)
 
 
-def test_what_cannot_be_gone_on_from_is_refused(store, start, tmp_path):
+def test_invalid_starting_networks_are_refused(store, start, tmp_path):
     out = tmp_path / "out"
     with pytest.raises(BadCheckpoint, match="kind is 'in', this training's is 'sain'"):
         fit("sain", store, TUNING, out, start_from=str(start / "in"))
@@ -280,7 +280,7 @@ def test_patience_needs_pushes_to_validate_on():
             FitConfig(validation_share=share)
 
 
-def test_equal_is_not_better(start):
+def test_an_equal_loss_is_no_improvement(start):
     network = load_network(start / "in")[0]
     best = Best.first(network, 0.5)
     assert best.or_better(network, 0.5, 7) is best

@@ -69,13 +69,13 @@ def losses(result, name):
     return np.array([line[name] for line in result.history])
 
 
-def test_training_reduces_the_loss_on_what_it_saw_and_what_it_did_not(trained):
+def test_training_reduces_training_and_test_losses(trained):
     for name in ("loss", "validation_loss"):
         found = losses(trained, name)
         assert found[-3:].mean() < 0.75 * found[0]
 
 
-def test_a_run_leaves_its_network_its_card_and_its_log(trained, store):
+def test_a_training_run_writes_network_card_and_log(trained, store):
     files = contents(trained.folder)
     assert files.keys() == {"config.json", MANIFEST, LOG, WEIGHTS, CARD}
     card = read_card(trained.folder)
@@ -88,7 +88,7 @@ def test_a_run_leaves_its_network_its_card_and_its_log(trained, store):
     assert load_model(str(trained.folder)).card == card
 
 
-def test_a_finished_run_is_left_alone(trained, store):
+def test_a_finished_run_stays_unchanged(trained, store):
     before = contents(trained.folder)
     steps = []
     count = lambda *step: steps.append(step)  # noqa: E731
@@ -119,14 +119,14 @@ def test_other_settings_touch_nothing(trained, store):
     assert contents(trained.folder) == before
 
 
-def test_a_folder_of_somebody_else_is_not_used(store, tmp_path):
+def test_a_foreign_folder_is_refused(store, tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(RunConflict, match="not empty"):
         fit("in", store, CONFIG, tmp_path)
     assert contents(tmp_path) == {"thesis.tex": b"years of work"}
 
 
-def test_the_stored_prediction_is_what_the_engine_says_at_prediction(trained, store):
+def test_the_stored_prediction_equals_the_engines(trained, store):
     made = load_model(str(trained.folder)).dynamics
     assert isinstance(made, SimulatorAugmented)
     arrays = store.read(slice(0, 6))
@@ -149,7 +149,7 @@ def test_the_stored_prediction_is_what_the_engine_says_at_prediction(trained, st
     )
 
 
-def test_pushes_with_known_ends_alone_can_be_trained_on(tmp_path):
+def test_pushes_with_only_final_poses_can_be_trained_on(tmp_path):
     # Of IN: all that its statistics can be of is the stored prediction of an engine.
     info = info_of(10, bodies=1, engine="recorded", seed=None)
     lengths = [12] * 7 + [7] * 3
@@ -208,7 +208,7 @@ def started(store, folder, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["devices", "processor", "versions"])
-def test_going_on_where_the_bits_would_differ_warns(store, tmp_path, monkeypatch, name):
+def test_resuming_on_another_machine_warns(store, tmp_path, monkeypatch, name):
     started(store, tmp_path, monkeypatch)
     started(store, tmp_path, monkeypatch)  # the same machine: no warning
     found = json.loads((tmp_path / MANIFEST).read_text())
@@ -227,7 +227,7 @@ def test_a_damaged_checkpoint_is_named(store, tmp_path, monkeypatch):
         fit("sain", store, CONFIG, tmp_path)
 
 
-def test_a_loss_that_is_no_number_stops_the_training(store, tmp_path, monkeypatch):
+def test_a_loss_of_nan_stops_the_training(store, tmp_path, monkeypatch):
     monkeypatch.setattr(fit_module, "make_step", never_learns(float("nan")))
     with pytest.raises(Diverged, match="`learning_rate`"):
         fit("in", store, CONFIG, tmp_path / "out")
@@ -241,7 +241,7 @@ def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_some_pushes_have_to_remain_for_training(store, tmp_path):
+def test_at_least_one_push_remains_for_training(store, tmp_path):
     with pytest.raises(BadInput, match="`validation_share` is 0.1.*no two pushes"):
         fit("sain", store.first(1), CONFIG, tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -262,13 +262,13 @@ BAD += [
 
 
 @pytest.mark.parametrize(("name", "value"), BAD)
-def test_settings_that_no_training_can_have_name_their_option(name, value):
+def test_impossible_settings_name_their_option(name, value):
     option = "--" + name.replace("_", "-")
     with pytest.raises(BadInput, match=f"^{option} is {value}"):
         FitConfig(**{name: value})
 
 
-def test_a_log_forgets_what_comes_after_the_checkpoint_and_what_was_cut(tmp_path):
+def test_a_log_drops_lines_after_the_checkpoint(tmp_path):
     lines = [{"iteration": i, "loss": 1 / i} for i in (5, 10, 15)]
     for line in lines:
         append_log(tmp_path, line)

@@ -52,7 +52,7 @@ def constant(of):
 
 
 @pytest.mark.parametrize("bodies", [1, 2])
-def test_what_is_held_for_a_single_step_is_not_held(residual, bodies):
+def test_a_hold_of_one_step_changes_nothing(residual, bodies):
     batch = batch_of(bodies)
     frame = push_frame(batch.scene, batch.initial)
     found = residual.in_frame(
@@ -66,13 +66,13 @@ def test_what_is_held_for_a_single_step_is_not_held(residual, bodies):
 
 
 @pytest.mark.parametrize("hold", [2, 8, 100])
-def test_a_network_that_never_changes_its_mind_may_be_held(residual, hold):
+def test_a_constant_network_may_be_held(residual, hold):
     made, batch = constant(residual), batch_of()
     found = predicted(made, batch, hold)
     np.testing.assert_allclose(found, predicted(made, batch, 1), atol=2e-6)
 
 
-def test_holding_for_shorter_comes_closer(residual):
+def test_a_shorter_hold_is_more_accurate(residual):
     batch = batch_of()
     wanted = predicted(residual, batch, 1)
     deviation = np.abs(wanted - predicted(constant(residual), batch, 1)).max()
@@ -87,7 +87,7 @@ def test_networks_of_the_papers_form_are_never_held():
 
 
 @pytest.mark.parametrize("held", [True, False])
-def test_the_gains_are_those_of_step_after_step(held):
+def test_the_gains_equal_single_steps(held):
     form, change = RelaxingResidual(), float(held)
     gain = form.gains(TIME_STEP, 50)
     pose, rate, poses, rates = 0.0, 1.0 - change, [], []
@@ -100,7 +100,7 @@ def test_the_gains_are_those_of_step_after_step(held):
     np.testing.assert_allclose(poses, gain[3] if held else gain[2])
 
 
-def test_what_a_residual_network_says_is_measured_by_the_engines_error(residual):
+def test_additive_outputs_are_scaled_by_the_engines_error(residual):
     batch = batch_of(1)
     last = np.zeros((batch.size, STEPS), bool)
     last[:, -1] = True
@@ -121,6 +121,6 @@ def test_what_a_residual_network_says_is_measured_by_the_engines_error(residual)
     assert scales.acceleration[0] == scales.acceleration[1]
 
 
-def test_a_hold_of_nothing_is_refused():
+def test_a_hold_of_zero_steps_is_refused():
     with pytest.raises(BadInput, match="`hold` is 0"):
         FitConfig(hold=0)

@@ -62,7 +62,7 @@ def test_the_loss_is_the_papers(seed):
     np.testing.assert_allclose(loss_of(*case), wanted, rtol=1e-5)
 
 
-def test_great_losses_count_linearly_where_that_is_asked_for():
+def test_large_losses_count_linearly_on_request():
     """Squares near zero; far out the loss grows by twice the limit times the error."""
     case = random_case()
     weights = replace(WEIGHTS, linear_from=0.5)
@@ -81,14 +81,14 @@ def test_great_losses_count_linearly_where_that_is_asked_for():
         assert np.all(squares - found <= squares**2 / (4 * 0.5**2) + rounding)
 
 
-def test_a_whole_turn_is_no_error():
+def test_a_full_rotation_has_zero_loss():
     predicted, pose, rate, *seen = random_case()
     predicted[..., :3], predicted[..., 3:] = pose, rate
     predicted[..., 2] += 2 * np.pi
     np.testing.assert_allclose(loss_of(predicted, pose, rate, *seen), 0, atol=1e-10)
 
 
-def test_what_was_not_observed_counts_for_nothing_even_if_it_is_nan():
+def test_unobserved_values_have_no_effect_even_nan():
     predicted, pose, rate, pose_seen, rate_seen = random_case()
     pose_seen[:, 1], rate_seen[:, 2] = False, False
     hidden = pose.copy(), rate.copy()

@@ -31,7 +31,7 @@ def assert_same(one, other):
         np.testing.assert_array_equal(a, b)
 
 
-def test_an_engine_moves_a_mirrored_push_as_the_mirror_shows(batch):
+def test_the_motion_of_a_mirrored_push_is_mirrored(batch):
     """The oracle is the engine: to what is mirrored it answers the mirrored truth."""
     seen = mirror(batch, SOME)
     found = PlanarEngine().rollout(seen.scene, seen.initial, seen.controls)
@@ -41,7 +41,7 @@ def test_an_engine_moves_a_mirrored_push_as_the_mirror_shows(batch):
     np.testing.assert_array_equal(moved > 1e-5, SOME)
 
 
-def test_what_the_engine_said_and_what_was_measured_are_mirrored_too(batch):
+def test_predictions_and_measured_poses_are_mirrored(batch):
     seen = mirror(batch, SOME)
     odd = np.asarray(SOME)
     for name, signs in (
@@ -56,7 +56,7 @@ def test_what_the_engine_said_and_what_was_measured_are_mirrored_too(batch):
     assert_same(mirror(batch, jnp.zeros(6, bool)), batch)
 
 
-def test_forces_are_mirrored_with_their_points_of_contact():
+def test_forces_and_contact_offsets_are_mirrored():
     info = info_of(6, kind="direct-force")
     arrays = made_up(info)
     rng = np.random.default_rng(0)
@@ -70,7 +70,7 @@ def test_forces_are_mirrored_with_their_points_of_contact():
         np.testing.assert_array_equal(found, np.asarray(wanted) * [1, -1])
 
 
-def test_the_iteration_decides_and_half_are_mirrored(tmp_path):
+def test_each_iteration_mirrors_half_of_the_pushes(tmp_path):
     info = info_of(200)
     store = write(tmp_path / "data", info, made_up(info))
     arrays = store.read(slice(None))

@@ -67,7 +67,7 @@ def kill_at(process, iteration: int):
 
 
 @pytest.mark.slow
-def test_a_killed_training_ends_in_the_same_bytes(tmp_path, tmp_path_factory):
+def test_a_killed_training_run_ends_byte_identical(tmp_path, tmp_path_factory):
     store = quiet_store(tmp_path_factory.getbasetemp())
     calm, killed = tmp_path / "calm", tmp_path / "killed"
     undisturbed = train(store, calm)

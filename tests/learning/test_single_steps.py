@@ -50,7 +50,7 @@ def trained(store, tmp_path_factory):
     return fit("sain", store, CONFIG, tmp_path_factory.mktemp("single") / "out")
 
 
-def test_an_engine_that_restarts_at_the_truth_stays_on_it(quiet):
+def test_a_restarted_true_engine_stays_on_the_truth(quiet):
     steps = to_single_steps(quiet, engine("planar"))
     assert steps.size == quiet.size * quiet.truth.shape[1]
     assert steps.truth.shape[1] == 1
@@ -72,7 +72,7 @@ def test_a_step_ends_where_the_next_one_begins(quiet):
     assert steps.simulated is None
 
 
-def test_an_engine_without_memory_does_not_mind_to_be_restarted():
+def test_restarting_a_memoryless_engine_changes_nothing():
     world = pushes("robot", 2)
     plain = PhysicsDynamics(engine("planar"))
     found = predict(Restarted(plain), *world).states
@@ -94,7 +94,7 @@ def test_training_predicts_a_step_as_the_restarted_model_does(quiet, name):
     np.testing.assert_allclose(found, wanted, atol=2e-5)
 
 
-def test_a_restarted_model_forgets_what_came_before():
+def test_a_restarted_model_keeps_no_state():
     # Two steps: the second is a push of its own from where the first one ended.
     model = SimulatorAugmented(network("sain", "robot"), Glide())
     scene, initial, controls = pushes("robot", 2, 2)
@@ -109,13 +109,13 @@ def test_a_restarted_model_forgets_what_came_before():
     assert np.abs(pack_motion(open_loop) - pack_motion(found)).max() > 1e-4
 
 
-def test_a_force_cannot_restart():
+def test_force_driven_pushes_cannot_restart():
     model = Restarted(PhysicsDynamics(engine("planar")))
     with pytest.raises(BadInput, match="a force drives"):
         predict(model, *pushes("direct-force", 2))
 
 
-def test_a_trained_network_says_that_it_is_of_single_steps(trained):
+def test_the_card_records_single_step_training(trained):
     found = np.array([line["loss"] for line in trained.history])
     assert found[-2:].mean() < 0.8 * found[0]
     assert not read_card(trained.folder).recurrent
@@ -124,7 +124,7 @@ def test_a_trained_network_says_that_it_is_of_single_steps(trained):
     assert isinstance(model.model, SimulatorAugmented)
 
 
-def test_what_cannot_be_cut_is_refused(store, tmp_path):
+def test_recorded_and_force_driven_pushes_are_refused(store, tmp_path):
     recorded = info_of(10, engine="recorded", seed=None)
     pushed = GenerateConfig(setup="direct-force", pushes=4, chunk_size=4, force_steps=8)
     for data in (
@@ -149,7 +149,7 @@ def test_bullet_cannot_restart_in_a_training(around_bullet, tmp_path):
         fit("sain", around_bullet, CONFIG, tmp_path / "out", assumed_engine="bullet")
 
 
-def test_a_network_alone_needs_no_engine_that_restarts(around_bullet):
+def test_in_needs_no_restarting_engine(around_bullet):
     bullet = find_internal_engine("bullet")
     task = Task("in", around_bullet, CONFIG, bullet)
     check_data(task)
@@ -157,6 +157,6 @@ def test_a_network_alone_needs_no_engine_that_restarts(around_bullet):
     assert np.isfinite(state.network.scales.body_deviation).all()
 
 
-def test_a_network_of_single_steps_is_not_put_around_bullet(trained):
+def test_single_step_networks_are_refused_around_bullet(trained):
     with pytest.raises(BadCheckpoint, match="recurrent is false.*`engine` planar"):
         load_model(str(trained.folder), engine="bullet", force=True)

@@ -77,7 +77,7 @@ def test_training_predicts_with_the_papers_equations(model):
         np.testing.assert_allclose(target.rate[:, push], truth[..., 3:], atol=1e-6)
 
 
-def test_poses_are_compared_with_what_was_measured():
+def test_targets_are_the_measured_poses():
     batch = batch_of("in", change=lambda a: a | {"measured": a["truth"][..., :3] + 0.5})
     truth, target = to_target(batch_of("in")), to_target(batch)
     np.testing.assert_array_equal(target.rate, truth.rate)
@@ -93,7 +93,7 @@ def test_two_devices_find_the_gradient_of_one(split_gradient):
     assert_same_tree(found, wanted, 1e-5)
 
 
-def test_filling_a_batch_up_adds_nothing(split_gradient):
+def test_padding_a_batch_changes_nothing(split_gradient):
     batch, net = batch_of(pushes=5), network("sain", "robot")
     filled = even_batch(batch)
     assert (batch.size, filled.size) == (5, 6)
@@ -101,7 +101,7 @@ def test_filling_a_batch_up_adds_nothing(split_gradient):
     assert_same_tree(split_gradient(net, filled), plain_gradient(net, batch), 1e-5)
 
 
-def test_many_pushes_are_summed_in_chunks(split_gradient):
+def test_many_pushes_are_summed_in_microbatches(split_gradient):
     batch, net = batch_of(pushes=1101, steps=3), network("sain", "robot")
     filled = even_batch(batch)
     assert filled.size == 1104  # two chunks on each of two devices
@@ -109,7 +109,7 @@ def test_many_pushes_are_summed_in_chunks(split_gradient):
     assert_same_tree(split_gradient(net, filled), plain_gradient(net, batch), 1e-5)
 
 
-def test_unobserved_steps_pull_at_nothing(split_gradient):
+def test_unobserved_steps_have_no_gradient(split_gradient):
     net = network("sain", "robot")
     whole = plain_gradient(net, batch_of())
     alone = split_gradient(net, batch_of(change=end_points_alone))
@@ -145,7 +145,7 @@ def test_l2_pulls_with_twice_the_weights():
     assert_same_tree(found, wanted, 1e-5)
 
 
-def test_l2_pulls_back_to_where_training_began():
+def test_l2_pulls_to_the_initial_weights():
     config = FitConfig(batch_size=PUSHES, l2=1e-3, clip_norm=1e9)
     state = first_state(network("in", "robot"), config)
     nothing = jax.tree.map(jnp.zeros_like, WEIGHTS)
@@ -157,7 +157,7 @@ def test_l2_pulls_back_to_where_training_began():
     assert_same_tree(found, wanted, 1e-4)
 
 
-def test_without_an_l2_of_its_own_the_number_of_pushes_decides():
+def test_the_default_l2_is_one_over_the_pushes():
     config = FitConfig(l2=None)
     assert config.for_pushes(25).l2 == 0.04
     assert FitConfig(l2=0.0).for_pushes(25).l2 == 0
@@ -181,7 +181,7 @@ def test_the_learning_rate_halves_every_so_many_iterations():
     np.testing.assert_allclose(sizes, wanted, rtol=1e-3)
 
 
-def test_long_gradients_are_cut_and_broken_ones_skipped():
+def test_large_gradients_are_clipped_and_nan_skipped():
     optimizer = make_optimizer(FitConfig(clip_norm=2.0))
     weight = jnp.zeros(2)
     state = optimizer.init(weight)
@@ -221,7 +221,7 @@ def spread(values, constant):
     return values.mean(0), np.where(deviation > constant, deviation, 1.0)
 
 
-def test_scales_are_the_statistics_of_what_networks_see():
+def test_scales_are_the_statistics_of_the_inputs():
     batch = batch_of()
     scales = feature_scales(batch, network("sain", "robot").features)
     pairs, bodies = seen_by_networks(batch)
@@ -233,7 +233,7 @@ def test_scales_are_the_statistics_of_what_networks_see():
     np.testing.assert_allclose(scales.body_deviation, deviation, rtol=1e-3)
 
 
-def test_a_property_that_never_varies_is_not_divided_by_rounding():
+def test_constant_properties_have_scale_one():
     def of_one_disk(arrays):
         alike = np.ones_like(arrays["mass"])
         return arrays | {"mass": 0.8937 * alike, "radius": 0.0525 * alike}
@@ -244,7 +244,7 @@ def test_a_property_that_never_varies_is_not_divided_by_rounding():
     assert scales.pair_deviation[-4:].tolist() == [1, 1, 1, 1]
 
 
-def test_the_scale_of_accelerations_is_theirs_and_the_same_for_x_and_y():
+def test_acceleration_scales_are_equal_for_x_and_y():
     batch = batch_of()
     scales = feature_scales(batch, network("sain", "robot").features)
     rates = np.asarray(batch.truth[..., 3:], np.float64)
@@ -258,7 +258,7 @@ def test_the_scale_of_accelerations_is_theirs_and_the_same_for_x_and_y():
 
 
 @pytest.mark.parametrize("model", ["in", "sain"])
-def test_loss_terms_are_divided_by_what_moves(model):
+def test_loss_terms_are_scaled_by_the_motion(model):
     batch = batch_of(model)
     config = FitConfig(weight_position=2.0, weight_spin=3.0)
     found = loss_weights(batch, config)
@@ -287,14 +287,14 @@ def still(arrays):
 
 @pytest.mark.parametrize("change", [still, end_points_alone])
 @pytest.mark.parametrize("bodies", [1, 2])
-def test_statistics_are_finite_whatever_the_pushes_lack(change, bodies):
+def test_statistics_are_finite_for_incomplete_pushes(change, bodies):
     batch = batch_of(change=change, bodies=bodies)
     scales = feature_scales(batch, network("sain", "robot").features)
     found = (scales, loss_weights(batch, FitConfig()))
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
 
 
-def test_the_mean_of_the_weights_is_that_of_tensorflow():
+def test_averaged_weights_follow_tensorflow():
     config, batch = FitConfig(average=4, learning_rate=1e-2), batch_of()
     step, plain = (
         make_step(config, WEIGHTS),

@@ -32,7 +32,7 @@ def world(setup):
 
 @pytest.mark.parametrize("setup", ["robot", "direct-force"])
 @pytest.mark.parametrize("name", ["physics", "sain"])
-def test_all_is_as_if_the_disks_were_where_the_robot_has_them(name, setup):
+def test_predictions_equal_those_in_robot_coordinates(name, setup):
     model = model_of(name, setup)
     scene, initial, controls = world(setup)
     plain = predict(model, scene, initial, controls)
@@ -56,7 +56,7 @@ def test_all_is_as_if_the_disks_were_where_the_robot_has_them(name, setup):
         )
 
 
-def test_two_advances_are_one_long_one():
+def test_two_advances_equal_a_long_advance():
     model = OffsetCamera(model_of("sain", "robot"), OFFSET)
     scene, initial, controls = world("robot")
     whole = predict(model, scene, initial, controls)
@@ -69,7 +69,7 @@ def test_two_advances_are_one_long_one():
     np.testing.assert_allclose(found, pack_motion(whole.states), atol=2e-5)
 
 
-def test_a_camera_that_agrees_is_no_wrapper():
+def test_a_zero_camera_offset_adds_no_wrapper():
     model = model_of("in", "robot")
     assert with_camera(model, CameraOffset()) is model
     found = with_camera(model, CameraOffset(x=1.5e-3))

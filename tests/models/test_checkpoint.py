@@ -70,7 +70,7 @@ def weights_with(folder, change):
 
 @pytest.mark.parametrize("kind", ["robot", "direct-force"])
 @pytest.mark.parametrize("model", ["in", "sain"])
-def test_a_network_comes_back_bit_for_bit(tmp_path, model, kind):
+def test_a_loaded_network_is_identical(tmp_path, model, kind):
     found, card = load_network(write_network(tmp_path, model, kind))
     wanted = network(model, kind)
     assert jax.tree.structure(found) == jax.tree.structure(wanted)
@@ -80,7 +80,7 @@ def test_a_network_comes_back_bit_for_bit(tmp_path, model, kind):
     assert (card.identity.kind, card.kind, card.time_step) == (model, kind, TIME_STEP)
 
 
-def test_the_registry_wraps_what_the_card_says(tmp_path):
+def test_the_registry_builds_the_model_of_the_card(tmp_path):
     sain = load_model(str(write_network(tmp_path / "a", "sain"))).dynamics
     assert isinstance(sain, SimulatorAugmented)
     assert sain.engine.assumptions == PAPER
@@ -98,7 +98,7 @@ def test_true_property_physics_assumes_the_table_friction_only():
     assert true.table_friction == PAPER.table_friction
 
 
-def test_an_unknown_name_lists_what_there_is(tmp_path):
+def test_an_unknown_model_lists_the_available_models(tmp_path):
     with pytest.raises(UnknownName, match=r"'nothing'.*physics-true.*folder"):
         load_model("nothing")
     with pytest.raises(BadCheckpoint, match=r"card\.json: not found"):
@@ -107,7 +107,7 @@ def test_an_unknown_name_lists_what_there_is(tmp_path):
 
 @pytest.mark.parametrize("name", [CARD, WEIGHTS])
 @pytest.mark.parametrize("harm", ["missing", "empty", "truncated", "random", "folder"])
-def test_a_harmed_file_is_named(folder, name, harm):
+def test_a_damaged_weights_file_is_named(folder, name, harm):
     path = folder / name
     whole = path.read_bytes()
     path.unlink()
@@ -252,7 +252,7 @@ def harmed(change):
         (lambda net: net.rel, "is missing"),
     ],
 )
-def test_weights_that_cannot_be_are_named(folder, change, says):
+def test_impossible_weights_are_named(folder, change, says):
     weights_with(folder, change)
     with pytest.raises(BadCheckpoint, match=rf"{WEIGHTS}: .*{says}"):
         load_network(folder)
@@ -266,7 +266,7 @@ def test_other_weights_than_the_cards_are_refused(folder):
         load_network(folder)
 
 
-def test_a_network_is_for_its_pushes_alone(folder):
+def test_a_network_is_refused_on_other_pushes(folder):
     model = load_model(str(folder))
     model.check_fits("robot", TIME_STEP)
     says = r"kind is 'robot'.*'direct-force'.*`force`"

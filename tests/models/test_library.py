@@ -49,19 +49,19 @@ def test_an_engine_with_true_properties_is_the_same_engine(folder):
     load_model(str(folder), engine="planar")
 
 
-def test_a_plain_network_has_no_engine_to_differ_in(tmp_path):
+def test_a_network_without_an_engine_fits_any_engine(tmp_path):
     plain = write_network(tmp_path / "plain", "in")
     load_model(str(plain), engine="bullet")
 
 
-def test_without_bullet_its_network_says_what_to_install(folder, monkeypatch):
+def test_without_bullet_its_network_names_the_extra(folder, monkeypatch):
     edit_simulator(folder, engine="bullet")
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(MissingExtra, match="bullet"):
         load_model(str(folder))
 
 
-def test_pushes_of_the_training_are_no_test(folder):
+def test_training_pushes_are_refused_as_test_pushes(folder):
     model = load_model(str(folder))
     card = re.escape(str(folder / CARD))
     with pytest.raises(BadCheckpoint, match=rf"^{card}: data_seeds has 0.*`seed`"):

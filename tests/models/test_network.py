@@ -106,7 +106,7 @@ def test_a_stored_prediction_replaces_the_engine(kind):
 
 
 @every_kind
-def test_a_residual_network_that_has_learned_nothing_is_the_engine(kind):
+def test_an_untrained_additive_network_equals_the_engine(kind):
     batch = moving_pushes(kind, 2)
     features, key = feature_set(kind, simulator=True), jax.random.key(0)
     silent = InteractionNetwork(
@@ -121,7 +121,7 @@ def test_a_residual_network_that_has_learned_nothing_is_the_engine(kind):
 
 @every_kind
 @every_model
-def test_a_network_that_sees_the_place_is_the_loops_too(model, kind):
+def test_a_network_with_table_features_equals_the_loop(model, kind):
     batch = moving_pushes(kind, 2)
     made = quick_dynamics(model, kind)
     seeing = network(model, kind, place=True)
@@ -136,7 +136,7 @@ def test_a_network_that_sees_the_place_is_the_loops_too(model, kind):
 
 
 @every_model
-def test_a_widened_network_says_the_same_until_it_learns(model):
+def test_a_widened_network_makes_the_same_predictions(model):
     batch = moving_pushes("robot", 2)
     made = quick_dynamics(model, "robot")
     scales = network(model, "robot", seed=3, place=True).scales
@@ -174,7 +174,7 @@ def test_effects_and_the_simulator_matter(model, kind):
         assert moved_by(other) > 1e-5
 
 
-def test_near_pairs_are_those_whose_gap_is_within_reach():
+def test_near_pairs_have_gaps_within_reach():
     x = [0.0, 0.119, 0.24, 0.36]  # gaps of 19, 21 and 20 mm, radii of 50 mm
     scene = make_scene(np.ones((1, 4)), [[0.05, 0.05, 0.05, 0.05]])
     place = jnp.stack([jnp.array(x), jnp.zeros(4)], axis=-1)[None]
@@ -192,7 +192,7 @@ def with_property(scene, name, change):
     return eqx.tree_at(where, scene, change(where(scene)))
 
 
-def test_a_network_is_told_masses_and_radii_but_never_a_friction():
+def test_inputs_contain_masses_and_radii_but_no_friction():
     scene, initial, controls = pushes("robot", 2)
     made = quick_dynamics("in", "robot")
     plain = predict(made, scene, initial, controls).final.position
@@ -206,14 +206,14 @@ def test_a_network_is_told_masses_and_radii_but_never_a_friction():
         assert np.abs(np.asarray(differs - plain)).max() > 1e-6
 
 
-def test_static_properties_are_no_part_of_a_prediction():
+def test_predictions_contain_no_static_properties():
     scene, initial, controls = pushes("robot", 2)
     states = predict(quick_dynamics("in", "robot"), scene, initial, controls).states
     names = {"position", "angle", "velocity", "spin"}
     assert vars(states).keys() == names | {"pusher_position", "pusher_velocity"}
 
 
-def test_the_nearest_disk_is_the_pushed_one():
+def test_the_nearest_disk_is_the_pushed_disk():
     # By surfaces: the centre of disk 1 is nearer, the surface of disk 2 is.
     scene = make_scene([[1.0, 1.0, 1.0]], [[0.02, 0.06, 0.05]])
     place = jnp.array([[[0.07, 0.0], [0.0, 0.08], [0.3, 0.3]]])
@@ -225,7 +225,7 @@ def test_the_nearest_disk_is_the_pushed_one():
 
 
 @every_kind
-def test_the_push_frame_looks_along_the_contact_normal(kind):
+def test_the_push_frame_has_its_x_axis_along_the_normal(kind):
     scene, initial, controls = moving_pushes(kind, 2)
     frame = push_frame(scene, initial)
     motion = pack_motion(initial)

@@ -79,7 +79,7 @@ def indices(plan):
 
 
 @pytest.mark.parametrize("angle", [0.25, 0.6, -0.9])
-def test_the_tree_finds_what_a_naive_search_finds(angle):
+def test_the_tree_equals_a_naive_search(angle):
     task = goal_ahead(0.17, angle)
     plan = TreePlanner(actions=FEW).plan(PHYSICS, task, SCENE, STATE)
     assert indices(plan) == best_of(task, 2)
@@ -102,7 +102,7 @@ def test_near_the_goal_the_best_sequences_get_a_third_push():
 
 
 @every_planner
-def test_one_push_that_is_enough_is_the_plan(name):
+def test_one_sufficient_push_is_the_plan(name):
     push = jax.tree.map(lambda x: x[20], PushGrid().pushes())
     goal = end_of(push, STATE).position[1]
     task = eqx.tree_at(lambda t: t.goal, goal_ahead(0.1), goal)
@@ -121,7 +121,7 @@ def test_the_grid_is_that_of_the_paper(name):
 
 
 @every_planner
-def test_the_same_decision_twice_is_the_same_plan(name):
+def test_equal_decisions_give_equal_plans(name):
     one, two = (make_planner(name).plan(PHYSICS, FAR, SCENE, STATE) for _ in range(2))
     np.testing.assert_array_equal(one.path, two.path)
     assert one.cost == two.cost
@@ -136,7 +136,7 @@ def test_the_greedy_search_follows_the_heuristic():
     assert found.looked_at == 12
 
 
-def test_the_greedy_search_looks_three_pushes_ahead_near_the_goal():
+def test_the_greedy_horizon_is_three_near_the_goal():
     planner = GreedyPlanner(actions=FEW, expansions=1 + 6 + 36)  # all there are
     found = planner.search(PHYSICS, NEAR, SCENE, STATE)
     assert len(found.actions) == 3
@@ -146,21 +146,21 @@ def test_the_greedy_search_looks_three_pushes_ahead_near_the_goal():
 
 
 @pytest.mark.parametrize("most", [0, 1])
-def test_the_greedy_search_ends_with_the_best_so_far_after_so_many_expansions(most):
+def test_the_greedy_search_stops_after_its_expansions(most):
     planner = GreedyPlanner(actions=FEW, expansions=most)
     found = planner.search(PHYSICS, FAR, SCENE, STATE)
     assert (found.looked_at, found.is_complete) == (6 + 6 * most, False)
     assert found.cost <= min(float(FAR.cost(e)) for e in naive_ends(1).values()) + 1e-6
 
 
-def test_a_queue_that_gives_nothing_ends_with_the_best_so_far():
+def test_an_empty_queue_ends_with_the_best_sequence():
     planner = GreedyPlanner(actions=FEW, same=10.0)  # every state is the first one
     found = planner.search(PHYSICS, FAR, SCENE, STATE)
     assert len(found.actions) == 1
     assert not found.is_complete
 
 
-def test_a_deadline_ends_with_the_best_so_far():
+def test_a_deadline_ends_with_the_best_sequence():
     hasty = TreePlanner(actions=FEW, deadline=1e-9, block=2)
     plan = hasty.plan(PHYSICS, FAR, SCENE, STATE)
     assert not plan.is_complete
@@ -171,7 +171,7 @@ def test_a_deadline_ends_with_the_best_so_far():
     assert plan.is_complete
 
 
-def test_what_a_deadline_leaves_time_for_is_what_follows_the_best_first_pushes(
+def test_a_deadline_expands_the_best_first_pushes(
     monkeypatch,
 ):
     task = goal_ahead(0.17, -0.9)  # the best pushes stand last in the grid
@@ -219,7 +219,7 @@ def behind(contact_angle):
     return chain, at_rest(position, jnp.zeros(3), single([0, 0]))
 
 
-def test_no_push_begins_inside_a_disk_nor_does_what_comes_after_one():
+def test_pushes_inside_a_disk_and_their_sequences_are_excluded():
     grid = jax.device_get(FEW.pushes())
     chain, state = behind(grid.contact_angle.max())
     blocked = grid.contact_angle == grid.contact_angle.max()
@@ -236,7 +236,7 @@ def test_no_push_begins_inside_a_disk_nor_does_what_comes_after_one():
 
 
 @every_planner
-def test_what_only_a_pusher_inside_a_disk_could_do_is_not_planned(name):
+def test_no_plan_has_a_pusher_inside_a_disk(name):
     planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
     for angle in (-0.6, 0.6):
         task = goal_ahead(0.17, angle)
@@ -256,7 +256,7 @@ def test_an_observation_with_nan_is_refused(name, field):
 
 
 @every_planner
-def test_disks_in_one_another_are_refused(name):
+def test_overlapping_disks_are_refused(name):
     planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
     with pytest.raises(BadScene, match="overlap by 8.0 mm"):
         planner.plan(PHYSICS, FAR, SCENE, touching(-0.008))
@@ -264,7 +264,7 @@ def test_disks_in_one_another_are_refused(name):
 
 
 @every_planner
-def test_a_model_that_predicts_nothing_finite_is_not_planned_with(name):
+def test_a_model_without_finite_predictions_is_refused(name):
     lost = eqx.tree_at(lambda task: task.goal, FAR, FAR.goal * jnp.nan)
     planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
     with pytest.raises(Diverged, match="pushes that it predicted left the finite"):
@@ -276,7 +276,7 @@ def doubtful(dynamics, state=None, actions=FEW):
     return planner.plan(dynamics, FAR, SCENE, state or touching()).warnings
 
 
-def test_a_plan_says_when_its_network_has_not_seen_the_like():
+def test_a_plan_warns_outside_the_training_range():
     network = quick_dynamics("in", "robot")
     assert doubtful(network) == ()
     (warning,) = doubtful(network, touching(0.02))
@@ -288,7 +288,7 @@ def test_a_plan_says_when_its_network_has_not_seen_the_like():
     assert any("contact angle" in warning for warning in found)
 
 
-def test_a_network_for_something_else_is_refused_before_it_plans_wrongly():
+def test_a_network_for_other_pushes_is_refused():
     with pytest.raises(BadCheckpoint, match="for direct-force pushes"):
         doubtful(quick_dynamics("in", "direct-force"))
     slow = replace(SCENE, time_step=0.01)

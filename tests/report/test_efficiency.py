@@ -25,7 +25,7 @@ def table(bodies=(1, 2)):
     return {"rows": rows}
 
 
-def test_it_holds_every_model_and_the_same_bytes_each_time(tmp_path):
+def test_the_figure_has_every_model_and_is_reproducible(tmp_path):
     one, two = (draw_data_efficiency(table(), tmp_path / f"{n}.svg") for n in "ab")
     assert one.read_bytes() == two.read_bytes()
     assert ElementTree.parse(one).getroot().tag.endswith("svg")
@@ -37,7 +37,7 @@ def test_it_holds_every_model_and_the_same_bytes_each_time(tmp_path):
         assert f">{pushes}</text>" in text
 
 
-def test_only_what_learns_has_a_band(tmp_path):
+def test_only_trained_models_have_a_band(tmp_path):
     text = draw_data_efficiency(table(), tmp_path / "a.svg").read_text()
     assert text.count('id="FillBetweenPolyCollection') == 2 * 2 * 2
 

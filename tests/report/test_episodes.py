@@ -11,7 +11,7 @@ from sainet.report.figures.episodes import body_paths, draw_episodes
 from sainet.report.palette import MOVED, PUSHED
 
 
-def test_a_path_goes_from_the_first_sight_to_the_end():
+def test_a_path_runs_from_the_first_observation_to_the_end():
     path = body_paths(record())
     assert path.shape == (1 + 3 * 3, 2, 3)
     np.testing.assert_array_equal(path[0, :, 0], [0, 113])
@@ -19,7 +19,7 @@ def test_a_path_goes_from_the_first_sight_to_the_end():
     assert body_paths(record(pushes=0)).shape == (1, 2, 3)
 
 
-def test_every_episode_has_a_panel_and_hostile_words_are_text(tmp_path):
+def test_every_episode_has_a_panel_and_hostile_text_is_escaped(tmp_path):
     bad = "<script>alert(1)</script> $x_{"
     failed = record(pushes=1, solved=False, reason=bad)
     records = [record(), failed, record(pushes=0)]
@@ -34,7 +34,7 @@ def test_every_episode_has_a_panel_and_hostile_words_are_text(tmp_path):
     assert MOVED in text
 
 
-def test_frames_are_what_was_seen_push_after_push():
+def test_frames_are_the_observations_of_each_push():
     frames = EpisodeFrames(record())
     assert frames.starts == [0, 4, 8]
     assert frames.poses.shape == (3 * 4, 2, 3)
@@ -55,7 +55,7 @@ def test_an_episode_without_a_push_has_one_frame():
     json.dumps(data, allow_nan=False)
 
 
-def test_the_end_is_told_by_where_the_disk_truly_is():
+def test_the_outcome_uses_the_true_final_pose():
     assert outcome(record()) == "solved with 3 pushes"
     assert outcome(record(pushes=1)) == "solved with 1 push"
     seen = record(solved=False, reason="solved")
@@ -64,7 +64,7 @@ def test_the_end_is_told_by_where_the_disk_truly_is():
     assert outcome(lost) == "out of pushes after 3 pushes"
 
 
-def test_what_left_the_finite_numbers_is_not_drawn(tmp_path):
+def test_nan_and_infinity_are_not_drawn(tmp_path):
     records = [lost_record(), lost_record() | {"turns": []}]
     text = draw_episodes(records, tmp_path / "a.svg").read_text()
     assert "nan" not in text.lower().replace("nance", "")
@@ -80,6 +80,6 @@ def test_a_long_reason_leaves_room_for_the_picture(tmp_path):
     assert draw_episodes([lost], tmp_path / "a.png").stat().st_size > 0
 
 
-def test_what_explains_a_reason_is_left_to_the_record():
+def test_details_of_a_reason_stay_in_the_record():
     lost = record(solved=False, reason="out of pushes: the goal was 177 mm away")
     assert outcome(lost) == "out of pushes after 3 pushes"

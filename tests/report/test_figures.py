@@ -31,7 +31,7 @@ DRAW = {
 
 
 @pytest.mark.parametrize("name", DRAW)
-def test_svg_is_well_formed_and_the_same_bytes_each_time(name, tmp_path):
+def test_svg_is_well_formed_and_reproducible(name, tmp_path):
     first, second = (DRAW[name](tmp_path / f"{n}.svg") for n in "ab")
     assert ElementTree.parse(first).getroot().tag.endswith("svg")
     assert first.read_bytes() == second.read_bytes()
@@ -49,7 +49,7 @@ def test_every_model_has_its_own_colour_in_the_figure(tmp_path):
         assert style_of(name).color in text
 
 
-def test_a_failed_drawing_leaves_what_was_there(tmp_path):
+def test_a_failed_drawing_keeps_the_old_file(tmp_path):
     path = tmp_path / "a.unheard-of"
     path.write_text("before")
     with pytest.raises(ValueError, match="unheard-of"):
@@ -76,7 +76,7 @@ def test_any_number_of_disks(bodies, tmp_path):
     assert draw_paths(push, tmp_path / "a.svg").stat().st_size > 1000
 
 
-def test_what_was_not_observed_or_diverged_is_left_out(tmp_path):
+def test_unobserved_and_diverged_steps_are_left_out(tmp_path):
     push = samples.replay()
     push.tracks["in"].position[100:] = np.nan
     text = draw_paths(push, tmp_path / "a.svg").read_text()
@@ -119,7 +119,7 @@ def test_unknown_models_get_colours_of_their_own():
     assert len(style_of("runs/" + 60 * "x").label) <= 40
 
 
-def test_a_network_of_another_form_is_called_after_the_one_that_is_known():
+def test_other_forms_of_a_network_extend_its_label():
     label = style_of("sain-bullet-bystander").label
     assert label == "SAIN around Bullet, bystander"
     assert style_of("in-single-steps").label == "IN, single steps"
@@ -127,7 +127,7 @@ def test_a_network_of_another_form_is_called_after_the_one_that_is_known():
         assert style_of(unknown).label == unknown
 
 
-def test_lines_are_told_apart_without_their_colours():
+def test_lines_differ_without_their_colours():
     others = ("physics-true", "in", "sain-bullet", "sain-true")
     styles = styles_of([*others, *(f"runs/{number}" for number in range(6))])
     dashes = {style.dash for style in styles.values()}
@@ -156,13 +156,13 @@ def test_faint_text_can_be_read(dark):
     assert (high + 0.05) / (low + 0.05) >= 4.5  # AA
 
 
-def test_a_running_mean_is_of_the_losses_around(tmp_path):
+def test_a_running_mean_averages_neighbouring_losses(tmp_path):
     losses = np.random.default_rng(0).lognormal(size=60)
     assert running_mean(losses)[30] == pytest.approx(losses[27:33].mean())
     assert running_mean(losses[:5]).tolist() == losses[:5].tolist()  # too few
 
 
-def test_a_learning_curve_explains_what_it_shows_alone(tmp_path):
+def test_a_legend_names_only_the_curves_that_are_drawn(tmp_path):
     whole = samples.histories()
     nothing = np.array([])
     alone = {name: (*parts[:2], nothing, nothing) for name, parts in whole.items()}

@@ -34,7 +34,7 @@ def pair(
     }
 
 
-def test_errors_stand_in_relation_to_physics_and_to_what_a_model_is_compared_with():
+def test_errors_are_relative_to_physics():
     calibrated = "physics-true"
     told = READINGS["of_errors"](
         {
@@ -73,7 +73,7 @@ def test_errors_stand_in_relation_to_physics_and_to_what_a_model_is_compared_wit
     assert "this table has 5" in told
 
 
-def test_what_a_bystander_taught_and_cost_is_told():
+def test_effects_of_a_bystander_are_stated():
     taught, called = "sain-bystander", "SAIN, bystander"
 
     def table(sain: float, beside: float) -> dict:
@@ -102,7 +102,7 @@ def test_what_a_bystander_taught_and_cost_is_told():
     assert f"| {called} | 0.15 / 0.15 | 0.50 / 0.50 |" in after
 
 
-def test_groups_of_pushes_are_set_beside_each_other():
+def test_groups_of_pushes_are_compared():
     def of_group(group: str, sain: float) -> list:
         rows = errors("physics", (2.0, 1.0), (1.0, 1.0)) + errors(
             "sain", (sain, sain), (sain, 0.5)
@@ -147,7 +147,7 @@ def test_groups_may_be_compared_in_other_errors():
     assert told.endswith("and this table has 2.")
 
 
-def test_control_says_where_models_differ_in_what_they_solve():
+def test_control_states_differences_in_success():
     def row(group: str, model: str, solved: int) -> dict:
         return {"group": group, "model": model, "solved": solved}
 

@@ -115,7 +115,7 @@ def test_hostile_text_is_escaped_everywhere():
     assert json.loads(scripts[0])["title"] == HOSTILE
 
 
-def test_what_is_not_a_number_becomes_null():
+def test_nan_becomes_null():
     push = samples.replay()
     push.tracks["in"].position[3] = np.nan
     data = json.loads(json.dumps(replay_data(push), allow_nan=False))

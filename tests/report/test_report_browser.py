@@ -103,7 +103,7 @@ def scrub_to(driver, step, block="replay-0"):
     )
 
 
-def test_plays_pauses_and_does_not_start_where_motion_is_unwelcome(still):
+def test_playback_respects_reduced_motion(still):
     time.sleep(0.3)
     assert milliseconds(still) == 0
     assert not is_playing(still)
@@ -157,7 +157,7 @@ def test_keys_play_step_and_jump(still):
     assert is_playing(still)
 
 
-def test_it_starts_over_at_the_end(still):
+def test_playback_restarts_at_the_end(still):
     still.find_element("css selector", "#replay-0-speed input[value='1']").click()
     scrub_to(still, 190)
     element(still, "play").click()
@@ -165,7 +165,7 @@ def test_it_starts_over_at_the_end(still):
     assert is_playing(still)
 
 
-def test_an_episode_is_told_push_by_push(still):
+def test_an_episode_is_shown_push_by_push(still):
     block = "episode-0"
     status = element(still, "status", block)
     assert status.text == "push 1 of 3: disk 2 is 150.0 mm from its goal"
@@ -179,7 +179,7 @@ def test_an_episode_is_told_push_by_push(still):
     assert milliseconds(still) == 0  # the other player is left alone
 
 
-def test_an_episode_plays_to_its_end_and_one_without_a_push_stands_still(still):
+def test_an_episode_plays_to_its_end(still):
     element(still, "play", "episode-0").click()
     status = element(still, "status", "episode-0")
     wait_until(lambda: status.text.startswith("solved"))
@@ -198,7 +198,7 @@ def test_nothing_is_wider_than_a_phone(still):
     assert wide == 390
 
 
-def test_starts_by_itself_once_it_is_seen(chromium, folder):
+def test_playback_starts_when_visible(chromium, folder):
     with opened(chromium, folder) as driver:
         driver.execute_script("arguments[0].scrollIntoView()", element(driver, "play"))
         driver.execute_script(

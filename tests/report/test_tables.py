@@ -47,7 +47,7 @@ def parse(result):
     return cells
 
 
-def test_html_holds_every_number_where_it_belongs():
+def test_html_has_every_number_in_its_cell():
     row = parse(samples.result()).rows[2]
     assert row[:4] == ["Physics", "500", "1.44 1.35–1.54", "1.30 1.22–1.39"]
     assert row[-2:] == ["34.0 32.0–36.4", "30.6 28.8–32.7"]
@@ -101,7 +101,7 @@ def test_metrics_without_numbers_are_left_out():
     assert "trans" not in printed(result)
 
 
-def test_where_ends_alone_are_known_nothing_is_said_twice():
+def test_final_errors_are_not_repeated():
     rows = [samples.row(model, 1, 0.5) for model in ("physics", "sain")]
     for row in rows:
         row |= {"pos_mm": row["final_pos_mm"], "rot_deg": row["final_rot_deg"]}
@@ -119,7 +119,7 @@ def test_where_ends_alone_are_known_nothing_is_said_twice():
     assert printed(alone).count("−1.000") == 1
 
 
-def test_physics_is_compared_with_where_nothing_better_informed_is():
+def test_physics_is_the_reference_without_true_properties():
     told = [
         {"model": "sain", "against": against, "group": None, "body": 1}
         | {"metric": "pos_mm", "difference": -1.0, "interval": None}
@@ -134,7 +134,7 @@ def test_physics_is_compared_with_where_nothing_better_informed_is():
     assert "SAIN minus Physics: pos" not in beside
 
 
-def test_nothing_at_all_is_said_in_words():
+def test_an_empty_table_is_a_sentence():
     for text in (to_html({"rows": []}), to_markdown({"rows": []}), printed({})):
         assert "Nothing to show" in text
 

@@ -24,7 +24,7 @@ def pictures():
     return list(draw_frames(record()))
 
 
-def test_a_film_shows_every_frame_and_then_holds(pictures):
+def test_an_animation_shows_every_frame_and_then_holds(pictures):
     shown = len(EpisodeFrames(record()).poses)
     assert len(pictures) == frame_count(record()) > shown
     assert {picture.shape for picture in pictures} == {(544, 960, 3)}
@@ -33,20 +33,20 @@ def test_a_film_shows_every_frame_and_then_holds(pictures):
     assert not any(changes[shown - 1 :])
 
 
-def test_a_film_goes_on_where_the_world_left_the_finite_numbers():
+def test_an_animation_continues_after_nan():
     lost = lost_record()
     assert len(list(draw_frames(lost))) == frame_count(lost)
 
 
 @pytest.mark.parametrize("pushes", [0, 1])
-def test_short_episodes_have_films_too(pushes, tmp_path):
+def test_short_episodes_have_animations(pushes, tmp_path):
     short = record(pushes=pushes)
     with Image.open(write_film(short, tmp_path / "a.gif")) as film:
         assert film.n_frames >= 1  # equal pictures are joined
         assert film.size == (960, 544)
 
 
-def test_both_formats_last_as_long_as_what_they_show(tmp_path):
+def test_both_formats_have_the_duration_of_the_episode(tmp_path):
     told = []
     gif = write_film(record(), tmp_path / "a.gif", on_frame=lambda: told.append(1))
     assert len(told) == frame_count(record())
@@ -64,9 +64,7 @@ def test_both_formats_last_as_long_as_what_they_show(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.gif", "a.mp4"]
 
 
-def test_without_the_extra_gif_is_the_best_and_mp4_says_what_to_install(
-    tmp_path, monkeypatch
-):
+def test_without_the_extra_mp4_names_it(tmp_path, monkeypatch):
     assert best_format() == ".mp4"
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     assert best_format() == ".gif"
@@ -75,7 +73,7 @@ def test_without_the_extra_gif_is_the_best_and_mp4_says_what_to_install(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_film_that_cannot_be_finished_leaves_nothing(tmp_path, monkeypatch):
+def test_a_failed_animation_leaves_no_file(tmp_path, monkeypatch):
     def broken(frames, path):
         path.write_bytes(b"half")
         raise RuntimeError("no more")

@@ -23,7 +23,7 @@ def robot(noise=QUIET, seed=0):
     return SimulatedRobot(engine, scene(), touching(), noise=noise, rng=rng)
 
 
-def test_without_noise_a_push_ends_where_the_engine_says():
+def test_without_noise_the_robot_equals_the_engine():
     made = robot()
     seen = made.observe()
     found = made.push(PUSH)
@@ -38,7 +38,7 @@ def test_without_noise_a_push_ends_where_the_engine_says():
     assert not np.asarray(made.observe().velocity).any()
 
 
-def test_what_is_seen_is_noisy_and_the_truth_is_not():
+def test_measured_poses_are_noisy_and_the_truth_is_not():
     made = robot(NoiseConfig())
     seen = np.array([made.observe().position for _ in range(300)])
     np.testing.assert_array_equal(made.truth.position, touching().position)
@@ -46,7 +46,7 @@ def test_what_is_seen_is_noisy_and_the_truth_is_not():
     assert np.abs(seen.mean(axis=0) - made.truth.position).max() < 4e-5
 
 
-def test_the_same_seed_is_the_same_world():
+def test_equal_seeds_give_equal_worlds():
     def end(seed):
         made = robot(NoiseConfig(), seed)
         made.observe()
@@ -56,14 +56,14 @@ def test_the_same_seed_is_the_same_world():
     assert np.abs(end(3) - end(4)).max() > 1e-5
 
 
-def test_a_push_that_moves_nothing_is_told():
+def test_a_push_that_moves_nothing_is_reported():
     made = robot()
     made.observe()
     short = eqx.tree_at(lambda p: p.length, PUSH, jnp.float32(1e-6))
     assert made.push(short).trouble == "disk 1 did not move"
 
 
-def test_a_push_that_begins_inside_another_disk_is_told():
+def test_a_push_that_starts_inside_a_disk_is_reported():
     made = robot()
     made.observe()
     backwards = eqx.tree_at(lambda p: p.contact_angle, PUSH, jnp.float32(np.pi))

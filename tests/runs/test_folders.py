@@ -46,7 +46,7 @@ def test_a_failed_write_keeps_the_old_file(tmp_path, failure):
     assert files(tmp_path) == {"file": b"old"}
 
 
-def test_the_old_file_is_there_until_the_new_one_is_whole(tmp_path):
+def test_the_old_file_stays_until_the_new_file_is_complete(tmp_path):
     path = tmp_path / "deep" / "file"
     with atomic_path(path) as new:
         new.write_text("new")
@@ -74,7 +74,7 @@ def test_a_folder_that_is_a_file_is_named(tmp_path):
         write_bytes(tmp_path / "file" / "inside", b"")
 
 
-def test_equal_values_are_equal_bytes(tmp_path):
+def test_equal_values_give_equal_bytes(tmp_path):
     assert to_json({"b": 1, "a": [1.5, None]}) == to_json({"a": [1.5, None], "b": 1})
     write_json(tmp_path / "x", {"a": "größer"})
     assert read_json(tmp_path / "x") == {"a": "größer"}
@@ -87,7 +87,7 @@ def test_equal_values_are_equal_bytes(tmp_path):
     [b"", b"{", b"[1]", b"3", b"\xff\xfe\x00", b"null", b"[" * 100_000],
     ids=lambda data: repr(data[:9]),
 )
-def test_what_is_no_json_object_is_refused_by_name(tmp_path, data):
+def test_files_without_a_json_object_are_named(tmp_path, data):
     (tmp_path / "x.json").write_bytes(data)
     with pytest.raises(
         BadStore, match=re.escape(f"{tmp_path / 'x.json'}: ")
@@ -114,7 +114,7 @@ def test_a_new_folder_gets_settings_and_a_manifest(tmp_path):
     assert run.is_finished
 
 
-def test_the_same_settings_come_back_and_change_nothing(tmp_path):
+def test_equal_settings_change_nothing(tmp_path):
     open_here(tmp_path / "run", size=(1, 2))
     before = files(tmp_path)
     open_here(tmp_path / "run", size=[1, 2])
@@ -131,7 +131,7 @@ def test_other_settings_conflict_and_touch_nothing(tmp_path, other):
     assert files(tmp_path) == before
 
 
-def test_folders_of_others_conflict_and_stay_as_they_are(tmp_path):
+def test_foreign_folders_conflict_and_stay_unchanged(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(RunConflict, match="not empty and no run of sainet"):
         open_here(tmp_path)
@@ -147,7 +147,7 @@ def test_settings_that_cannot_be_read_conflict(tmp_path):
     assert files(tmp_path) == {"config.json": b"{"}
 
 
-def test_a_run_killed_as_it_began_goes_on(tmp_path):
+def test_a_run_killed_at_its_start_resumes(tmp_path):
     (tmp_path / ".config.json.0.partial").write_text("{")
     (tmp_path / "manifest.json").write_text("{}")
     open_here(tmp_path)
@@ -171,7 +171,7 @@ time.sleep(60)
 """
 
 
-def test_one_process_at_a_time_works_in_a_folder(tmp_path):
+def test_a_run_folder_is_locked_by_its_process(tmp_path):
     folder = tmp_path / "run"
     command = [sys.executable, "-c", AT_WORK, str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE) as other:
@@ -191,7 +191,7 @@ def test_one_process_at_a_time_works_in_a_folder(tmp_path):
     assert first.lock is second.lock is not None
 
 
-def test_a_name_that_no_folder_can_have_is_one_line(tmp_path):
+def test_an_impossible_folder_name_gives_one_line(tmp_path):
     path = tmp_path / ("x" * 300)
     with pytest.raises(RunConflict, match="cannot be read .*; choose another") as told:
         open_here(path)
@@ -202,7 +202,7 @@ def test_an_empty_folder_is_used(tmp_path):
     assert open_here(tmp_path).path == tmp_path
 
 
-def test_manifests_are_the_same_tomorrow_and_elsewhere(tmp_path, monkeypatch):
+def test_manifests_depend_on_neither_time_nor_folder(tmp_path, monkeypatch):
     first = manifest(2)
     monkeypatch.setattr("time.time", lambda: 0.0)
     monkeypatch.chdir(tmp_path)

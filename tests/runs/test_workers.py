@@ -49,7 +49,7 @@ def wait_for(folder: Path, pattern: str, count: int):
 
 @pytest.mark.parametrize("whole_group", [True, False])
 @pytest.mark.parametrize("jobs", [1, 5])  # a worker is idle; jobs are waiting
-def test_an_interruption_is_quiet_ends_what_is_under_way_and_begins_no_more(
+def test_an_interruption_quietly_ends_all_jobs(
     jobs, whole_group, tmp_path
 ):
     script = tmp_path / "jobs.py"
@@ -74,7 +74,7 @@ def test_an_interruption_is_quiet_ends_what_is_under_way_and_begins_no_more(
     assert len(list(tmp_path.glob("kept-[0-9]"))) == under_way
 
 
-def test_a_worker_that_is_ended_is_told_of_and_the_way_out():
+def test_a_killed_worker_is_reported_with_a_remedy():
     with (
         pytest.raises(SainetError, match="want of memory.*fewer workers") as told,
         worker_pool(1) as pool,
@@ -100,7 +100,7 @@ def shell(request):
 
 
 @pytest.mark.usefixtures("shell")
-def test_a_failure_ends_what_is_under_way_in_this_pool_alone(tmp_path):
+def test_a_failure_ends_only_the_jobs_of_its_pool(tmp_path):
     with worker_pool(1) as other:
         other.submit(core_count).result()  # its process is there, and idle
         with pytest.raises(ZeroDivisionError), worker_pool(2) as pool:

@@ -14,7 +14,7 @@ def test_units_have_length_one_and_their_direction():
     np.testing.assert_allclose(direction(unit(ANGLES)), ANGLES, atol=1e-6)
 
 
-def test_turning_is_counter_clockwise_and_undone_by_turning_back():
+def test_rotation_is_counter_clockwise_and_invertible():
     x = jnp.array([1.0, 0.0])
     np.testing.assert_allclose(rotate(x, jnp.asarray(jnp.pi / 2)), [0, 1], atol=1e-7)
     vectors = jnp.stack([ANGLES, 2 - ANGLES], -1)
@@ -26,14 +26,14 @@ def test_turning_is_counter_clockwise_and_undone_by_turning_back():
     )
 
 
-def test_the_length_of_nothing_has_no_slope():
+def test_the_norm_of_zero_has_zero_gradient():
     np.testing.assert_array_equal(jax.grad(norm)(jnp.zeros(2)), [0, 0])
     np.testing.assert_allclose(jax.grad(norm)(jnp.array([3.0, 4.0])), [0.6, 0.8])
     assert float(norm(jnp.array([3.0, 4.0]))) == 5
     assert jnp.isnan(norm(jnp.array([jnp.nan, 4.0])))
 
 
-def test_wrapped_angles_are_the_same_directions_within_a_turn():
+def test_wrapped_angles_are_equal_directions_within_a_turn():
     angles = jnp.linspace(-20, 20, 81)
     wrapped = wrap_angle(angles)
     assert (wrapped >= -jnp.pi).all()

@@ -61,7 +61,7 @@ def test_the_pusher_touches_the_back_of_disk_1(places):
     assert float(pusher_gaps(scene, apart)[0, 0]) == pytest.approx(0.01, abs=1e-7)
 
 
-def test_angles_turn_the_place_and_the_direction():
+def test_angles_rotate_the_start_and_the_heading():
     scene, state = scene_and_state([[0.0, 0.0]])
     turned = push(contact=np.pi / 2, direction=-np.pi / 6)
     place = place_pusher(scene, state, turned)
@@ -71,7 +71,7 @@ def test_angles_turn_the_place_and_the_direction():
     np.testing.assert_allclose(heading[0], wanted, atol=1e-6)
 
 
-def test_a_path_goes_its_length_at_its_speed_and_holds():
+def test_a_path_has_its_length_and_speed_and_then_holds():
     start, heading = jnp.array([[0.1, 0.2]]), jnp.array([[0.6, 0.8]])
     controls = path_controls(push(), start, heading, steps=60, time_step=TIME_STEP)
     assert controls.steps == 60
@@ -112,7 +112,7 @@ def test_forces_are_constant_along_the_heading():
     np.testing.assert_allclose(controls.contact_offset, [[-0.1, 0.0]], rtol=1e-6)
 
 
-def test_batches_are_what_mapping_over_scenes_gives():
+def test_a_batch_equals_a_map_over_scenes():
     scene, state = scene_and_state([[0.3, -0.2], [0.25, -0.1]])
     one = jax.tree.map(lambda x: x[0], (scene, state))
     pushes = PushGrid().pushes()

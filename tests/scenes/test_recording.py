@@ -21,6 +21,6 @@ def test_a_recording_counts_its_disks():
 
 
 @pytest.mark.parametrize("time", [(0.1, 0.1), (0.2, 0.1), (0.0, np.nan)])
-def test_a_clock_that_does_not_increase_is_refused(time: tuple):
+def test_times_that_do_not_increase_are_refused(time: tuple):
     with pytest.raises(BadInput, match="pushes.csv: push a: time must increase"):
         recording(time=time)

@@ -59,7 +59,7 @@ def test_at_rest_nothing_moves():
     assert not np.asarray(state.pusher_velocity).any()
 
 
-def test_trajectories_know_their_end_and_their_bad_steps():
+def test_trajectories_have_a_final_state_and_bad_steps():
     packed = jnp.stack([pack_motion(STATE) * t for t in (1.0, 2.0, 3.0)], axis=1)
     path = jnp.zeros((1, 3, 2))
     trajectory = Trajectory(unpack_motion(packed, path, path))

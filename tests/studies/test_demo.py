@@ -54,7 +54,7 @@ def test_the_report_of_the_demo_plays(demo, chromium):
             assert title.startswith(f"SAIN, {goals} goal 1: solved with ")
 
 
-def test_an_unknown_experiment_lists_the_known():
+def test_an_unknown_study_lists_the_available_studies():
     with pytest.raises(UnknownName, match="robot-planar"):
         load_experiment("table-9")
     assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
@@ -81,7 +81,7 @@ def begun(monkeypatch):
         ("engine-parity", MissingExtra, "PyBullet"),
     ],
 )
-def test_what_cannot_be_made_is_said_before_anything_runs(
+def test_missing_requirements_are_reported_before_any_run(
     second, error, says, begun, monkeypatch
 ):
     monkeypatch.setitem(sys.modules, "pybullet", None)
@@ -90,7 +90,7 @@ def test_what_cannot_be_made_is_said_before_anything_runs(
     assert begun == []
 
 
-def test_all_that_can_be_made_is_told_even_when_quiet(begun, monkeypatch, capsys):
+def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     Reproduce(output=Output(quiet=True)).run()
     assert begun == ["robot-planar-quick", "fine-tuning-quick"]
@@ -100,7 +100,7 @@ def test_all_that_can_be_made_is_told_even_when_quiet(begun, monkeypatch, capsys
     assert bullet.startswith("Left out without PyBullet: direct-force-two-disks, ")
 
 
-def test_several_trainings_at_once_are_refused_on_one_gpu(begun, monkeypatch):
+def test_parallel_training_is_refused_on_one_gpu(begun, monkeypatch):
     monkeypatch.setattr("jax.default_backend", lambda: "gpu")
     with pytest.raises(BadInput, match="--trainers is 2; on a GPU it must be 1"):
         Reproduce(experiments=("robot-planar",), trainers=2).run()
@@ -109,7 +109,7 @@ def test_several_trainings_at_once_are_refused_on_one_gpu(begun, monkeypatch):
     assert begun == ["robot-planar-quick"]
 
 
-def test_the_help_names_every_experiment():
+def test_the_help_names_every_study():
     source = (SOURCE / "cli" / "reproduce.py").read_text("utf-8")
     assert all(name in source for name in EXPERIMENTS)
 

@@ -26,7 +26,7 @@ SMALLER = ("iterations", "batch_size")
 
 
 @pytest.mark.slow
-def test_small_ones_have_the_cards_of_the_shipped_ones(tiny, chain, tmp_path):
+def test_small_networks_have_the_cards_of_shipped_networks(tiny, chain, tmp_path):
     require(find_spec("pybullet"), "PyBullet is not installed")
     tool = runpy.run_path(str(REPOSITORY / "tools" / "pretrained.py"))
     tool["build"](paper_setup("robot", "quick", chain), tmp_path / "into")

@@ -85,7 +85,7 @@ def test_without_recorded_pushes_there_is_no_table(chain):
 
 
 @pytest.mark.slow
-def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
+def test_no_push_is_predicted_by_a_network_trained_on_it(make, tmp_path):
     table = make("recorded-pushes")
     names = {"physics", "physics-identified", *(each.name for each in FEW)}
     told = "sain-identified-residual"
@@ -126,7 +126,7 @@ def test_every_push_is_predicted_by_what_never_saw_it(make, tmp_path):
 
 
 @pytest.mark.slow
-def test_ways_to_tune_are_compared_over_robots(make, monkeypatch, tmp_path):
+def test_settings_of_tuning_are_compared_over_robots(make, monkeypatch, tmp_path):
     one = {"learning_rate": 1e-3, "mirror": False}
     robots = (Robot("a", assumed_friction=0.25), Robot("b", unexplained=0))
     monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
@@ -163,7 +163,7 @@ def test_ways_to_tune_are_compared_over_robots(make, monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_more_pushes_hold_the_fewer(make, tmp_path):
+def test_larger_training_sets_contain_the_smaller_sets(make, tmp_path):
     table = make("recorded-data-efficiency")
     groups = {row["group"] for row in table["rows"]}
     assert groups == {"3", "5"}

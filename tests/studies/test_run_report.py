@@ -16,7 +16,7 @@ from sainet.studies.run_report import TABLE, page_of, report_of
 from studies.test_simulated_control import result as control_table
 
 
-def test_a_training_is_its_card_and_its_curve(tmp_path):
+def test_a_training_run_has_its_card_and_curve(tmp_path):
     folder = tmp_path / "net"
     shutil.copytree(PRETRAINED / "sain", folder)
     draw_learning_curve(samples.histories(), folder / "learning-curve.svg")
@@ -43,7 +43,7 @@ def test_errors_episodes_and_figures_come_together(tmp_path):
     assert "alert" not in page
 
 
-def test_goals_are_a_table_of_their_own(tmp_path):
+def test_control_results_have_their_own_table(tmp_path):
     table = control_table()
     table["rows"][0]["group"] = "<b>easy</b>"
     write_json(tmp_path / TABLE, table)
@@ -54,7 +54,7 @@ def test_goals_are_a_table_of_their_own(tmp_path):
     assert "McNemar" in page
 
 
-def test_what_was_identified_is_said(tmp_path):
+def test_identified_parameters_are_in_the_report(tmp_path):
     known = {"name": "pusher_friction", "value": 0.31, "low": 0.3, "high": 0.32}
     estimates = [
         {**known, "start": 0.25, "doubt": None},
@@ -69,7 +69,7 @@ def test_what_was_identified_is_said(tmp_path):
     assert "Mean errors of 12 pushes: position 2.00 mm before" in page
 
 
-def test_what_hides_beside_a_figure_is_left_out(tmp_path):
+def test_hidden_content_of_a_figure_is_left_out(tmp_path):
     hidden = "<!-- <svg onload='alert(1)'> -->"
     doctype = "<!DOCTYPE svg [<!ENTITY a \"<svg onload='alert(2)'>\">]>"
     labelled = samples.replay(models=("me@home url(x)",))
@@ -104,7 +104,7 @@ def test_what_hides_beside_a_figure_is_left_out(tmp_path):
         ("paths.svg", "<svg>", "cannot be read as a figure"),
     ],
 )
-def test_what_is_hostile_or_damaged_is_named(name, text, told, tmp_path):
+def test_hostile_and_damaged_files_are_named(name, text, told, tmp_path):
     if name is not None:
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -114,7 +114,7 @@ def test_what_is_hostile_or_damaged_is_named(name, text, told, tmp_path):
     assert len(str(error.value).splitlines()) == 1
 
 
-def test_a_folder_of_folders_names_one(tmp_path):
+def test_a_folder_of_run_folders_names_one_of_them(tmp_path):
     write_json(tmp_path / "robot-planar-quick" / TABLE, json.loads("{}"))
     with pytest.raises(BadInput, match="robot-planar-quick, say"):
         report_of(tmp_path)

@@ -11,7 +11,7 @@ from sainet.studies import simulated_control
 from sainet.studies.simulated_control import Group, groups
 
 
-def test_the_trials_are_those_of_the_paper_and_more():
+def test_the_trials_include_those_of_the_paper():
     found = {group.name: group.config for group in groups(100)}
     assert all(config.world == "bullet" for config in found.values())
     sizes = [config.trials for config in found.values()]
@@ -22,7 +22,7 @@ def test_the_trials_are_those_of_the_paper_and_more():
 
 
 @pytest.mark.slow
-def test_models_push_to_the_same_goals(make, tmp_path, monkeypatch):
+def test_all_models_have_the_same_goals(make, tmp_path, monkeypatch):
     (usual, *_) = groups(2)
     small = replace(usual.config, world="planar", pushes=1)
     monkeypatch.setattr(
@@ -71,7 +71,7 @@ def result():
     return {"rows": rows, "pairs": pairs, "published": [theirs]}
 
 
-def test_the_table_says_everything_once():
+def test_the_control_table_has_every_result_once():
     console = Console(record=True, width=140, file=None)
     with console.capture() as capture:
         print_control(result(), console)
@@ -89,7 +89,7 @@ def test_the_table_says_everything_once():
     assert "| hard, tree | IN | 0/100 |" in lines[3]
 
 
-def test_error_tables_are_no_control_tables():
+def test_error_tables_are_refused_as_control_tables():
     assert is_control(result())
     assert not is_control({"rows": [{"model": "in", "pos_mm": 1.0}]})
     assert not is_control({"rows": []})

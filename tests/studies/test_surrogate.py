@@ -41,26 +41,26 @@ def turned(arrays, by):
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_what_is_unexplained_knows_no_left_and_right(seed):
+def test_unexplained_errors_are_mirror_symmetric(seed):
     angles = np.linspace(-1.4, 1.4, 57)
     off = unexplained(strokes(angles), seed)
     assert off[::-1] == pytest.approx(off * [1, -1, -1], abs=1e-12)
     assert (np.abs(off).max(axis=0) > [1e-4, 1e-4, 0.02]).all()
 
 
-def test_what_is_unexplained_turns_with_the_push():
+def test_unexplained_errors_rotate_with_the_push():
     arrays = strokes(np.array([-1.0, 0.3, 0.8]))
     off, seen = unexplained(arrays, 0), unexplained(turned(arrays, 0.7), 0)
     assert seen == pytest.approx(turned({"off": off}, 0.7)["off"], abs=1e-12)
 
 
-def test_a_disk_that_is_moved_half_as_far_is_half_as_far_off():
+def test_errors_are_proportional_to_the_travel():
     angles = np.linspace(-1.4, 1.4, 9)
     whole, half = (unexplained(strokes(angles, share), 0) for share in (1.0, 0.5))
     assert half == pytest.approx(whole / 2)
 
 
-def test_what_is_unexplained_has_the_stated_size_over_many_robots():
+def test_unexplained_errors_have_the_stated_size():
     angles = np.linspace(0.5, 1.4, 5)
     many = np.stack([unexplained(strokes(angles), seed) for seed in range(500)])
     size = np.sqrt(np.mean(many**2, axis=(0, 1)))
@@ -79,7 +79,7 @@ def whole_strokes(angles):
     return arrays
 
 
-def test_pushes_are_placed_as_a_whole():
+def test_pushes_are_moved_as_a_whole():
     arrays = whole_strokes(np.array([-1.0, 0.3, 0.8]))
     there = placed(arrays, 0)
     # What one sees from the pusher, whichever way one looks, stays as it was.
@@ -110,7 +110,7 @@ def test_pushes_are_placed_as_a_whole():
     )
 
 
-def test_the_table_knows_place_and_direction():
+def test_table_errors_depend_on_position_and_heading():
     arrays = strokes(np.zeros(400))
     rng = np.random.default_rng(0)
     arrays["initial"][:, 0, 2] = rng.uniform(-np.pi, np.pi, 400)
@@ -123,7 +123,7 @@ def test_the_table_knows_place_and_direction():
     assert not np.allclose(of_the_table(turned(arrays, 1.0))[:, 2], by_side[0, 2])
 
 
-def test_what_the_table_does_is_nothing_on_average():
+def test_table_errors_have_zero_mean():
     arrays = whole_strokes(np.zeros(20_000))
     arrays["initial"][:, 0, :2] = 0  # as a store has them
     there = placed(arrays, 0)
@@ -139,12 +139,12 @@ def test_what_the_table_does_is_nothing_on_average():
     assert (seen.std(axis=0) > [5e-4, 5e-4, np.deg2rad(2)]).all()
 
 
-def test_robots_are_not_alike():
+def test_robots_differ():
     assert len({(r.assumed_friction, r.unexplained) for r in ROBOTS}) == len(ROBOTS)
 
 
 @pytest.mark.slow
-def test_recordings_know_the_ends_alone_and_a_friction(chain):
+def test_only_final_poses_of_recordings_are_observed(chain):
     robot = Robot("wrong", assumed_friction=0.25, unexplained=0)
     right = Robot("right")
     stores = {

@@ -71,7 +71,7 @@ def both(store, folder):
 
 
 @pytest.mark.slow
-def test_networks_trained_at_once_are_those_trained_one_by_one(store, tmp_path):
+def test_parallel_training_gives_the_same_networks(store, tmp_path):
     alone, bars_alone = chain_of(tmp_path / "alone")
     names = alone.train_seeds(both(store, alone.out), SEEDS)
     assert names == {
@@ -99,13 +99,13 @@ def test_networks_trained_at_once_are_those_trained_one_by_one(store, tmp_path):
     assert bars.told["Training IN-FORM-SEED-5"] == [20, 20]
 
 
-def test_each_goes_on_from_the_network_of_its_own_seed(store, tmp_path):
+def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
     training = replace(both(store, tmp_path)["in"], start_from="some/in")
     starts = [one.start_from for one in training.of_seeds(SEEDS)]
     assert starts == ["some/in-seed-3", "some/in-seed-4"]
 
 
-def test_a_training_that_fails_is_told_of_as_it_is(store, tmp_path):
+def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):
     trainings = both(store, tmp_path)["in"].of_seeds(SEEDS)
     (tmp_path / "in-form-seed-4").mkdir()
     (tmp_path / "in-form-seed-4" / "config.json").write_text("{}")
@@ -114,7 +114,7 @@ def test_a_training_that_fails_is_told_of_as_it_is(store, tmp_path):
 
 
 @pytest.mark.parametrize("processes", [Broken(), Gone()])
-def test_a_process_that_is_ended_is_told_of(store, tmp_path, processes):
+def test_a_killed_training_process_is_reported(store, tmp_path, processes):
     trainings = both(store, tmp_path)["in"].of_seeds(SEEDS)
     with pytest.raises(SainetError, match="want of memory"):
         train_at_once(trainings, processes, lambda done, note: None)

@@ -50,7 +50,7 @@ def test_solved_is_within_a_tenth_of_the_radius():
 
 
 @pytest.mark.parametrize("moved", [2, -1])
-def test_a_disk_that_is_not_there_cannot_be_moved(moved):
+def test_an_unknown_target_disk_is_refused(moved):
     task = goal_ahead(0.1, moved=moved)
     is_solved = partial(task.is_solved, scene())
     for judge in (task.distance, task.cost, is_solved):
@@ -58,18 +58,18 @@ def test_a_disk_that_is_not_there_cannot_be_moved(moved):
             judge(touching())
 
 
-def test_a_disk_that_left_the_finite_numbers_is_not_at_its_goal():
+def test_a_disk_at_nan_or_infinity_is_not_at_its_goal():
     lost = jax.tree.map(lambda x: x * jnp.nan, touching())
     assert not bool(goal_ahead(0.0).is_solved(scene(), lost))
     assert not jnp.isfinite(goal_ahead(0.0).distance(lost))
 
 
-def test_a_disk_on_its_goal_has_no_cost_but_its_alignment():
+def test_a_disk_on_its_goal_costs_only_its_alignment():
     assert float(goal_ahead(0.0).cost(touching())) == pytest.approx(0.0, abs=1e-5)
 
 
 @pytest.mark.parametrize(("kind", "low", "high"), [("easy", 0, 30), ("hard", 30, 60)])
-def test_goals_lie_where_the_paper_says(kind, low, high):
+def test_goals_follow_the_paper(kind, low, high):
     disk, axis = np.array([0.4, -0.2]), 0.7
 
     def draw(trial, seed=0):

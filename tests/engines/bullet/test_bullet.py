@@ -35,7 +35,7 @@ def same_bits(one, other) -> bool:
 
 
 @pytest.mark.parametrize("setup", ["robot", "direct-force"])
-def test_a_push_is_the_same_bits_after_any_others(setup):
+def test_a_push_does_not_depend_on_earlier_pushes(setup):
     engine = make_engine("bullet")
     some = pushed(GenerateConfig(setup=setup, disks=2, pushes=4), 1, 60)
     others = pushed(GenerateConfig(disks=3, pushes=6), 2, 40)
@@ -47,7 +47,7 @@ def test_a_push_is_the_same_bits_after_any_others(setup):
     assert same_bits(rows(backwards, slice(None, None, -1)), before)
 
 
-def test_other_processes_give_the_same_bits():
+def test_worker_processes_give_identical_results():
     many = pushed(GenerateConfig(disks=2, pushes=24), 3, 60)
     together = roll_out(make_engine("bullet"), *many).states
     for row in (0, 13, 23):
@@ -56,7 +56,7 @@ def test_other_processes_give_the_same_bits():
         assert same_bits(alone, rows(together, part))
 
 
-def test_a_process_that_was_ended_is_told_of_and_replaced():
+def test_a_killed_process_is_reported_and_replaced():
     many = pushed(GenerateConfig(disks=1, pushes=9), 3, 2)
     before = roll_out(make_engine("bullet"), *many).states
     wait([pool._pool().submit(os._exit, 1)])
@@ -65,7 +65,7 @@ def test_a_process_that_was_ended_is_told_of_and_replaced():
     assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
 
 
-def test_processes_that_were_interrupted_are_replaced():
+def test_interrupted_processes_are_replaced():
     many = pushed(GenerateConfig(disks=1, pushes=9), 3, 2)
     before = roll_out(make_engine("bullet"), *many).states
     for process in multiprocessing.active_children():
@@ -75,7 +75,7 @@ def test_processes_that_were_interrupted_are_replaced():
     assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
 
 
-def test_a_friction_field_slows_each_disk_where_it_is():
+def test_varying_friction_acts_at_the_position_of_each_disk():
     """Two disks far apart coast through fields that are constant where each is."""
     scene = make_scene(np.ones((1, 2)), np.full((1, 2), 0.05), table=0.1)
     # cos is +1 at x = 0 and -1 at x = 1, and flat at both.
@@ -94,7 +94,7 @@ def test_a_friction_field_slows_each_disk_where_it_is():
     np.testing.assert_allclose(travel, wanted, rtol=0.05)
 
 
-def test_the_pusher_is_where_its_path_says():
+def test_the_pusher_follows_its_path():
     scene, start, controls = pushed(GenerateConfig(disks=2, pushes=4), 5, 100)
     states = roll_out(make_engine("bullet"), scene, start, controls).states
     gap = np.abs(np.asarray(states.pusher_position) - controls.position)
@@ -108,14 +108,14 @@ def test_the_pusher_is_where_its_path_says():
         ((3, 13), "no wheels.*3.13.*installs nothing"),
     ],
 )
-def test_without_pybullet_the_way_out_is_named(version, wanted, monkeypatch):
+def test_without_pybullet_the_message_names_the_extra(version, wanted, monkeypatch):
     monkeypatch.setattr("sainet.engines.bullet.engine.find_spec", lambda _: None)
     monkeypatch.setattr(sys, "version_info", (*version, 0))
     with pytest.raises(MissingExtra, match=wanted):
         make_engine("bullet")
 
 
-def test_bodies_are_told_never_to_sleep():
+def test_bodies_never_sleep():
     import pybullet
 
     assert world._NEVER_SLEEPS == pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
@@ -137,7 +137,7 @@ def in_a_row(disks):
     return scene, start, far_away(1, 4)
 
 
-def test_every_disk_that_bullet_has_a_group_for_slides_and_one_more_is_refused():
+def test_thirty_disks_slide_and_one_more_is_refused():
     final = roll_out(make_engine("bullet"), *in_a_row(30)).final
     moved = np.asarray(final.position)[0] - [[0.2 * i, 0] for i in range(30)]
     np.testing.assert_allclose(
