@@ -267,7 +267,7 @@ def test_overlapping_disks_are_refused(name):
 def test_a_model_without_finite_predictions_is_refused(name):
     lost = eqx.tree_at(lambda task: task.goal, FAR, FAR.goal * jnp.nan)
     planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
-    with pytest.raises(Diverged, match="pushes that it predicted left the finite"):
+    with pytest.raises(Diverged, match="is both feasible and"):
         planner.plan(PHYSICS, lost, SCENE, STATE)
 
 
@@ -292,9 +292,7 @@ def test_a_network_for_other_pushes_is_refused():
     with pytest.raises(BadCheckpoint, match="for direct-force pushes"):
         doubtful(quick_dynamics("in", "direct-force"))
     slow = replace(SCENE, time_step=0.01)
-    with pytest.raises(
-        BadCheckpoint, match=r"steps of 0.00416\d+ s, the scene's are 0.01"
-    ):
+    with pytest.raises(BadCheckpoint, match=r"step of 0.00416\d+ s, the scene 0.01"):
         make_planner("tree").plan(quick_dynamics("in", "robot"), FAR, slow, STATE)
 
 

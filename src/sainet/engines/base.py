@@ -1,4 +1,4 @@
-"""What every engine can do."""
+"""The interface of engines."""
 
 from abc import abstractmethod
 
@@ -10,26 +10,26 @@ from sainet.scenes.state import State, Trajectory
 
 
 class AbstractEngine(eqx.Module):
-    """Predicts how a scene moves under controls, from first principles."""
+    """A physics engine, which simulates the motion of a scene under controls."""
 
     @abstractmethod
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls (eq. 2: open loop).
 
-        All arguments share their leading batch axes. The final state holds all that
-        is needed to go on: two rollouts in a row equal one long rollout.
+        All arguments share their leading batch axes. The final state is complete: two
+        consecutive rollouts equal one long rollout.
         """
 
     @property
     def on_host(self) -> bool:
-        """Whether it works outside JAX: no compiled function may hold its rollouts."""
+        """Whether it runs outside JAX, so that its rollouts cannot be compiled."""
         return False
 
 
 def roll_out(
     engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
 ) -> Trajectory:
-    """Roll any engine out, compiled once for each set of shapes where it can be."""
+    """Return the rollout of any engine, compiled once per set of shapes if possible."""
     if engine.on_host:
         return engine.rollout(scene, initial, controls)
     return _compiled(engine, scene, initial, controls)

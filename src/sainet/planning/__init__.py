@@ -1,4 +1,4 @@
-"""Search for the next pushes: the paper's greedy search, and the full tree."""
+"""Planners: the paper's greedy search, and the full tree."""
 
 from typing import TYPE_CHECKING
 
@@ -18,12 +18,12 @@ def make_planner(name: str, *, deadline: float | None = None) -> "AbstractPlanne
     """Return a planner with its default settings.
 
     Args:
-        name: of the planner.
-        deadline: s, after which the best plan so far is taken; only for `tree`.
+        name: name of the planner.
+        deadline: time after which the best plan so far is used, s; only for `tree`.
 
     Raises:
         UnknownName: no planner has this name.
-        BadSetting: this planner has no deadline.
+        BadSetting: the planner accepts no deadline.
     """
     planner = load_named("planner", PLANNERS, name)
     if deadline is None:

@@ -1,4 +1,4 @@
-"""A plan, and what every planner can do."""
+"""Plans, and the interface of planners."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -20,19 +20,19 @@ from sainet.tasks.base import AbstractTask
 
 @dataclass(frozen=True)
 class Plan:
-    """The pushes that a planner chose, the next one first."""
+    """The pushes selected by a planner, in order of execution."""
 
     pushes: tuple[Push, ...]
-    path: Float[np.ndarray, "time body 3"]  # predicted poses, push after push
-    cost: float  # at the end
-    distance: float  # at the end, m
-    looked_at: int  # pushes that were predicted to choose these
-    is_complete: bool = True  # False: a deadline or a search's own limit came first
-    warnings: tuple[str, ...] = ()  # why the prediction may be worth less
+    path: Float[np.ndarray, "time body 3"]  # predicted poses over all pushes
+    cost: float  # at the end of the path
+    distance: float  # at the end of the path, m
+    looked_at: int  # number of predicted pushes
+    is_complete: bool = True  # False: a deadline or limit ended the search early
+    warnings: tuple[str, ...] = ()  # why the prediction may be inaccurate
 
 
 class AbstractPlanner(eqx.Module):
-    """Chooses the next pushes; remembers nothing from one decision to the next."""
+    """A planner, which selects the next pushes; stateless between decisions."""
 
     actions: eqx.AbstractVar[PushGrid]
 
@@ -45,19 +45,19 @@ class AbstractPlanner(eqx.Module):
     def plan(
         self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
     ) -> Plan:
-        """Return what to do next, and what will come of it.
+        """Return the plan for the next pushes, with its predicted path.
 
         Args:
-            dynamics: predicts; any model.
-            task: what is to be done.
-            scene: one scene, without a batch axis, as the model is to believe it.
-            state: as it was observed; it is taken to be at rest.
+            dynamics: model that predicts.
+            task: task to solve.
+            scene: one scene, without a batch axis, with the properties for the model.
+            state: observed state, assumed to be at rest.
 
         Raises:
-            BadScene: the observation is not finite, disks lie in one another, or the
-                task is about one that is not there.
-            BadCheckpoint: the model is for another time step or for other controls.
-            Diverged: whatever is pushed, the model leaves the finite numbers.
+            BadScene: the observation is not finite, disks overlap, or the scene has no
+                target disk.
+            BadCheckpoint: the model is for another time step or other controls.
+            Diverged: no candidate push has a finite prediction.
         """
         check_model(dynamics, scene)
         gap = check_observation(scene, state)
@@ -78,7 +78,7 @@ class AbstractPlanner(eqx.Module):
 
 @dataclass(frozen=True)
 class Found:
-    """What a search ends with."""
+    """The sequence of actions that a search selects."""
 
     actions: tuple[int, ...]
     cost: float
@@ -90,7 +90,7 @@ class Found:
 def predicted_path(
     dynamics: AbstractDynamics, scene: Scene, state: State, pushes: tuple[Push, ...]
 ) -> Float[np.ndarray, "time body 3"]:
-    """Return the poses over all pushes, every push from rest."""
+    """Return the poses over all pushes, each of which starts at rest (m, m, rad)."""
     roll = _path_and_rest if dynamics.on_host else _compiled_path_and_rest
     state = jax.tree.map(_batch_of_one, state)
     poses = []

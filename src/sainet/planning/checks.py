@@ -1,4 +1,4 @@
-"""What cannot be planned from, and what makes a plan worth less."""
+"""Checks of the inputs of a planner, and warnings about its plans."""
 
 from collections.abc import Iterator, Sequence
 
@@ -13,38 +13,38 @@ from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pair_gaps
 from sainet.scenes.state import State, check_state
 
-_DEEPEST_OVERLAP = 5e-3  # m, of disks that were seen; more is no noise of a camera
-_APART = 5e-3  # m: networks are trained on disks that touch
-_SAME_TIME = 1e-9  # s
-_SLACK = 1e-3  # of a push, relative
+_DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise
+_APART = 5e-3  # m, gap that counts as apart: networks are trained on touching disks
+_SAME_TIME = 1e-9  # s, difference below which time steps are equal
+_SLACK = 1e-3  # relative tolerance of the training range
 _compiled_gaps = eqx.filter_jit(pair_gaps)
 
 
 def check_model(dynamics: AbstractDynamics, scene: Scene) -> None:
-    """Raise `BadCheckpoint` if a network was made for another step or other controls.
+    """Raise `BadCheckpoint` if a network is for another time step or other controls.
 
-    It would predict something, and nobody would see that it is wrong.
+    Its predictions would be wrong without any other sign.
     """
     made_for = dynamics.made_for
     if made_for is None:
         return
     if made_for.kind != PathControls.kind:
         raise BadCheckpoint(
-            f"model: its network is for {made_for.kind} pushes, planners push along "
-            f"paths; train one with: sainet generate {PathControls.kind}"
+            f"model: its network is for {made_for.kind} pushes, but planners push "
+            f"along paths; train a network on {PathControls.kind} pushes."
         )
     if abs(made_for.time_step - scene.time_step) > _SAME_TIME:
         raise BadCheckpoint(
-            f"model: its network is for steps of {made_for.time_step:g} s, the scene's "
-            f"are {scene.time_step:g} s; give the scene that time step."
+            f"model: its network has a time step of {made_for.time_step:g} s, the "
+            f"scene {scene.time_step:g} s; give the scene the same time step."
         )
 
 
 def check_observation(scene: Scene, state: State) -> float:
-    """Return the least gap between two disks (m), infinite if there is but one.
+    """Return the smallest gap between two disks (m), infinite for a single disk.
 
     Raises:
-        BadScene: nothing can be planned from what was observed.
+        BadScene: the observation is not finite, or disks overlap.
     """
     check_state(state, "observation")
     gap = float(np.min(np.asarray(_compiled_gaps(scene, state)), initial=np.inf))
@@ -59,12 +59,12 @@ def check_observation(scene: Scene, state: State) -> float:
 def doubts(
     dynamics: AbstractDynamics, gap: float, pushes: Sequence[Push]
 ) -> Iterator[str]:
-    """Yield why the prediction of a plan may be worth less than usual.
+    """Yield reasons why the prediction of a plan may be inaccurate.
 
     Args:
-        dynamics: what predicts; an engine alone is as good anywhere.
-        gap: the least between two disks at the start, m.
-        pushes: the planned ones.
+        dynamics: model that predicts; physics has no training range.
+        gap: smallest gap between two disks at the start, m.
+        pushes: planned pushes.
     """
     if dynamics.made_for is None:
         return
@@ -75,11 +75,11 @@ def doubts(
         )
     for number, push in enumerate(pushes, start=1):
         for name in _beyond_training(push):
-            yield f"push {number}: its {name} is none that networks were trained on"
+            yield f"push {number}: its {name} is outside the training range of networks"
 
 
 def _beyond_training(push: Push) -> list[str]:
-    """Return what of a push lies outside of the paper's pushes."""
+    """Return the parameters of a push that are outside the paper's range."""
     usual = PushGrid()
     wide = 1 + _SLACK
     outside = {

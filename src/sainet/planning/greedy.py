@@ -1,4 +1,4 @@
-"""The paper's search (section IV-D): greedy, with a queue and a short horizon."""
+"""The paper's greedy search (section IV-D), with a queue and a short horizon."""
 
 from heapq import heappop, heappush
 from itertools import count
@@ -20,25 +20,26 @@ _NEAR = 0.010  # m
 
 
 class GreedyPlanner(AbstractPlanner):
-    """A queue of action sequences, ordered by the heuristic.
+    """Greedy search with a queue of action sequences, ordered by the heuristic.
 
-    The sequence of least heuristic is taken out, its 72 continuations are predicted and
-    go into the queue, but for those that end where the queue has been already. The
-    first sequence of the whole horizon that comes out is the plan; so is the nearest to
-    the goal of those that solve the task. Where the queue runs empty, or after so many
-    expansions, the sequence of least heuristic is, and the search is not complete.
+    Each expansion removes the sequence of least heuristic and queues its 72
+    continuations, except those that end at a state queued before. If an expansion
+    contains solutions, the plan is the one nearest to the goal. Otherwise the plan is
+    the first full-length sequence to leave the queue. If the queue runs empty or the
+    limit of expansions is reached, the plan is the sequence of least heuristic, and the
+    search is incomplete.
     """
 
     actions: PushGrid = PushGrid()
     horizon: int = eqx.field(static=True, default=2)
     near_horizon: int = eqx.field(static=True, default=3)  # within 10 mm of the goal
-    same: float = eqx.field(static=True, default=1e-3)  # m, between equal states
-    expansions: int = eqx.field(static=True, default=12)  # after the first, at most
+    same: float = eqx.field(static=True, default=1e-3)  # m, below which states equal
+    expansions: int = eqx.field(static=True, default=12)  # maximum, after the first
 
     def search(
         self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
     ) -> Found:
-        """Return the first sequence of the horizon's length that the queue gives."""
+        """Return the sequence selected by the queue."""
         pushes = jax.device_get(self.actions.pushes())
 
         def expand(states: State) -> Outcomes:
@@ -62,18 +63,18 @@ class GreedyPlanner(AbstractPlanner):
 
 
 class _Queue:
-    """Sequences by heuristic; knows every state that it had."""
+    """A queue of sequences ordered by heuristic, with the states queued so far."""
 
     def __init__(self, same: float, start: np.ndarray) -> None:
         self._same, self._seen = same, start[None]  # m; [state, body, 2]
         self._heap: list[tuple[float, int, Level, int]] = []
-        self._ticket = count()  # of equal costs, first come
+        self._ticket = count()  # equal costs leave in order of arrival
 
     def __bool__(self) -> bool:
         return bool(self._heap)
 
     def add(self, level: Level) -> None:
-        """Add the sequences of a level that end at a state the queue had not."""
+        """Add the sequences of a level that end at new states."""
         for row in level.cheapest(len(level.actions)):
             place = np.asarray(level.outcomes.state.position[row])
             gaps = np.linalg.norm(self._seen - place, axis=-1).max(axis=-1)
@@ -83,5 +84,5 @@ class _Queue:
                 heappush(self._heap, (cost, next(self._ticket), level, int(row)))
 
     def pop(self) -> tuple[Level, int]:
-        """Take out the sequence of least heuristic."""
+        """Remove and return the sequence of least heuristic."""
         return heappop(self._heap)[2:]

@@ -1,4 +1,4 @@
-"""Sequences of one length and how they end: what a search chooses among."""
+"""Levels: sequences of one length with their outcomes, which a search selects from."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,31 +17,31 @@ Expand = Callable[[State], Outcomes]
 
 @dataclass(frozen=True)
 class Level:
-    """Sequences of one length, one a row, and their outcomes."""
+    """Sequences of one length, one per row, with their outcomes."""
 
     outcomes: Outcomes  # [sequence]
     actions: Int[np.ndarray, "sequence push"]  # indices into the grid
 
     @property
     def cost(self) -> Float[np.ndarray, " sequence"]:
-        """The cost at the end of each sequence; not finite counts as infinite."""
+        """The cost at the end of each sequence; infinite where it is NaN."""
         return np.nan_to_num(self.outcomes.cost, nan=np.inf, posinf=np.inf)
 
     def cheapest(self, count: int) -> Int[np.ndarray, " count"]:
-        """Return the rows of least cost, the least first."""
+        """Return the rows of least cost, in order of cost."""
         return np.argsort(self.cost, kind="stable")[:count]
 
     def grow(self, rows: Int[np.ndarray, " row"], expand: Expand) -> "Level":
-        """Return what becomes of some sequences with every push after them."""
+        """Return some sequences, extended by every push."""
         states = jax.tree.map(lambda x: x[rows], self.outcomes.state)
         found, possible = expand(states), np.isfinite(self.cost[rows])[:, None]
-        # Nothing comes after a push that cannot be made.
+        # No push follows an infeasible push.
         cost, solved = np.where(possible, found.cost, np.inf), found.solved & possible
         found = found._replace(cost=cost, solved=solved)
         return flatten(found, self.actions[rows])
 
     def found(self, row: int, looked_at: int, *, is_complete: bool = True) -> Found:
-        """Return one of the sequences as what a search ends with."""
+        """Return one of the sequences as the result of a search."""
         return Found(
             actions=tuple(int(action) for action in self.actions[row]),
             cost=float(self.outcomes.cost[row]),
@@ -52,7 +52,7 @@ class Level:
 
 
 def flatten(outcomes: Outcomes, parents: Int[np.ndarray, "state push"]) -> Level:
-    """Return outcomes ``[state, push]`` as sequences, one a row."""
+    """Return outcomes ``[state, push]`` as sequences, one per row."""
     states, pushes = outcomes.cost.shape
     last = np.tile(np.arange(pushes), states)[:, None]
     actions = np.concatenate([np.repeat(parents, pushes, axis=0), last], axis=1)
@@ -61,14 +61,14 @@ def flatten(outcomes: Outcomes, parents: Int[np.ndarray, "state push"]) -> Level
 
 
 def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
-    """Return the shortest sequence that solves the task, else the one of least cost.
+    """Return the shortest sequence that solves the task, else that of least cost.
 
     Args:
-        levels: from short sequences to long ones.
-        is_complete: whether everything was looked at that should have been.
+        levels: in order of sequence length.
+        is_complete: whether the search ran to its end.
 
     Raises:
-        Diverged: no cost is finite: there is nothing to choose by.
+        Diverged: no cost is finite.
     """
     looked_at = sum(len(level.actions) for level in levels)
     for level in levels:
@@ -81,8 +81,7 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     best = min(levels, key=lambda level: level.cost.min())
     if not np.isfinite(best.cost.min()):
         raise Diverged(
-            f"model: each of the {looked_at} pushes that it predicted left the finite "
-            "numbers, or would begin inside a disk; check the scene and the "
-            "observation, or give another model."
+            f"model: none of the {looked_at} candidate pushes is both feasible and "
+            "finite; check the scene and the observation, or use another model."
         )
     return best.found(int(best.cheapest(1)[0]), looked_at, is_complete=is_complete)

@@ -1,4 +1,4 @@
-"""What every push does to every state: one batched call of any dynamics model."""
+"""Outcomes of every candidate push from every state: one batched call of a model."""
 
 from typing import NamedTuple
 
@@ -18,15 +18,15 @@ from sainet.tasks.base import AbstractTask
 
 SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 
-_NEVER_IN_THE_WAY = 2  # disks: the second lies ahead of the first, the pusher behind
-_AT_ONCE = 1296  # rows: what a network makes of more of them leaves the cache
+_NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
+_AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
 
 
 class Outcomes(NamedTuple):
-    """Where pushes end, and what a task says of it; rest is taken for granted."""
+    """Final states of pushes, assumed at rest, as judged by the task."""
 
     state: State  # everything at rest
-    cost: Float[Array, "*batch"]  # infinite: the push cannot be made
+    cost: Float[Array, "*batch"]  # m, infinite for infeasible pushes
     distance: Float[Array, "*batch"]  # m
     solved: Bool[Array, "*batch"]
 
@@ -38,26 +38,26 @@ def every_push(
     states: State,
     pushes: Push,
 ) -> Outcomes:
-    """Predict every push from every state, up to when everything rests.
+    """Return the outcome of every push from every state, until all bodies rest.
 
     Compiled once for each number of states, split over all devices.
 
     Args:
-        dynamics: predicts.
-        task: judges.
+        dynamics: model that predicts.
+        task: task that judges.
         scene: one scene, without a batch axis.
-        states: at rest, ``[state]``.
-        pushes: the actions, ``[push]``.
+        states: states at rest, ``[state]``.
+        pushes: candidate pushes, ``[push]``.
 
     Returns:
         The outcomes, ``[state, push]``, as NumPy arrays.
     """
     count, actions = states.angle.shape[0], pushes.length.shape[0]
-    # NumPy: a search makes many small steps, each of which JAX would dispatch.
+    # NumPy: JAX would dispatch each of the many small operations of a search.
     rows = jax.tree.map(lambda x: np.repeat(x, actions, axis=0), states)
     each = jax.tree.map(lambda x: np.tile(x, count), pushes)
     shared = dynamics, task, scene
-    if dynamics.on_host:  # it uses every core by itself
+    if dynamics.on_host:  # the engine uses every core itself
         flat = _judge(shared, *jax.tree.map(jnp.asarray, (rows, each)))
     else:
         flat = over_devices(_judge, shared, rows, each, most=_AT_ONCE)
@@ -68,7 +68,7 @@ def every_push(
 def roll_pushes(
     dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
 ) -> Trajectory:
-    """Predict one push from each state; all arguments share one batch axis."""
+    """Return the motion of one push from each state; all share one batch axis."""
     start, heading = place_pusher(scene, states, pushes), push_direction(states, pushes)
     initial = at_rest(states.position, states.angle, start)
     controls = path_controls(
@@ -79,7 +79,7 @@ def roll_pushes(
 
 
 def batch_of(scene: Scene, count: int) -> Scene:
-    """Return a scene as a batch of equal ones."""
+    """Return a scene as a batch of equal scenes."""
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *x.shape)), scene)
 
 
@@ -98,7 +98,7 @@ def _judge(
 
 
 def _has_room(scenes: Scene, states: State, pushes: Push) -> Bool[Array, " batch"]:
-    """Return whether the pusher would begin inside no disk."""
+    """Return whether the pusher starts outside all disks."""
     start = place_pusher(scenes, states, pushes)
     initial = at_rest(states.position, states.angle, start)
     return (pusher_gaps(scenes, initial)[..., 1:] >= 0).all(axis=-1)

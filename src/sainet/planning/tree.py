@@ -15,20 +15,20 @@ from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
-_NEAR = 0.010  # m, from where on a third push is looked at (the paper's 10 mm)
+_NEAR = 0.010  # m, distance below which third pushes are predicted (as in the paper)
 
 
 class TreePlanner(AbstractPlanner):
-    """Looks at every push, and from where each ends at every push again.
+    """Search over all sequences of two pushes.
 
-    A sequence that solves the task with fewer pushes wins; among others the least
-    cost. Near the goal, the best sequences of two are looked at with a third push.
+    The shortest sequence that solves the task wins; without a solution, the sequence of
+    least cost. Near the goal, the best sequences of two are extended by a third push.
     """
 
     actions: PushGrid = PushGrid()
     beam: int = eqx.field(static=True, default=12)  # sequences that get a third push
     deadline: float | None = eqx.field(static=True, default=None)  # s
-    block: int = eqx.field(static=True, default=12)  # first pushes between two looks
+    block: int = eqx.field(static=True, default=12)  # first pushes per deadline check
 
     def search(
         self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
@@ -41,7 +41,7 @@ class TreePlanner(AbstractPlanner):
 
         root = jax.tree.map(lambda x: np.asarray(x)[None], state)
         levels = [flatten(expand(root), np.zeros((1, 0), int))]
-        # The most promising first pushes come first: a deadline may cut the rest.
+        # Expand the most promising first pushes first: a deadline may end the search.
         order = levels[0].cheapest(len(levels[0].actions))
         blocks = [order] if self.deadline is None else self._blocks(order)
         for block in blocks:
@@ -55,7 +55,7 @@ class TreePlanner(AbstractPlanner):
         return choose(levels)
 
     def _clock(self):  # noqa: ANN202
-        """Return a function that says whether the deadline has passed."""
+        """Return a function that returns whether the deadline has passed."""
         end = time.perf_counter() + (self.deadline or np.inf)
         return lambda: time.perf_counter() > end
 
@@ -64,7 +64,7 @@ class TreePlanner(AbstractPlanner):
         return np.split(np.resize(order, count * self.block), count)
 
     def _third(self, levels: list[Level], expand: Expand) -> Level:
-        """Return what a third push makes of the best sequences of two."""
+        """Return the best sequences of two, extended by every third push."""
         joined = Level(
             jax.tree.map(lambda *x: np.concatenate(x), *(v.outcomes for v in levels)),
             np.concatenate([level.actions for level in levels]),

@@ -1,7 +1,7 @@
 """Structure of arrays: one array over the batch for each number of each body.
 
-The pusher is the last body. Elementwise code on whole batches is what XLA fuses into
-one vectorised loop, which is where the engine's speed comes from.
+The pusher is the last body. XLA fuses elementwise code on whole batches into one
+vectorised loop, which makes the engine fast.
 """
 
 from typing import NamedTuple
@@ -27,20 +27,20 @@ class Bodies(NamedTuple):
 
 
 class Properties(NamedTuple):
-    """What the solver needs to know of each body; the pusher comes last."""
+    """Properties of each body for the solver; the pusher is last."""
 
     radius: Scalars  # m
     inverse_mass: Scalars  # 1/kg
     inverse_inertia: Scalars  # 1/(kg m^2)
-    weight: Scalars  # N, of the disks alone
-    arm: Scalars  # m, of the table's friction torque, of the disks alone
+    weight: Scalars  # N, disks only
+    arm: Scalars  # m, lever arm of table friction torque, disks only
     disk_friction: Array
     pusher_friction: Array
     table_friction: Array
 
 
 def to_bodies(state: State) -> Bodies:
-    """Take a state apart."""
+    """Return a state as one array per number and body."""
     still = jnp.zeros_like(state.pusher_position[..., 0])
     return Bodies(
         x=(*_last(state.position[..., 0]), state.pusher_position[..., 0]),
@@ -53,7 +53,7 @@ def to_bodies(state: State) -> Bodies:
 
 
 def to_state(bodies: Bodies) -> State:
-    """Put a state together again."""
+    """Return the state of bodies; the inverse of `to_bodies`."""
     return State(
         position=_pairs(bodies.x[:-1], bodies.y[:-1]),
         angle=jnp.stack(bodies.angle[:-1], axis=-1),
@@ -69,7 +69,7 @@ def to_state(bodies: Bodies) -> State:
 def to_properties(
     scene: Scene, pressure_radius_ratio: float | Array, pusher_inverse_mass: float
 ) -> Properties:
-    """Return what the solver needs; a pusher that follows a path cannot be moved."""
+    """Return the properties; contacts do not move a pusher that follows a path."""
     none = jnp.zeros_like(scene.pusher_radius)
     mass, radius = _last(scene.mass), _last(scene.radius)
     return Properties(

@@ -1,8 +1,8 @@
-"""The same solver for many bodies: only the closest pairs are looked at.
+"""The solver for many bodies, restricted to the closest pairs.
 
-Disks that touch without overlapping form a planar graph (a coin graph), so that N
-bodies have at most 3 N - 6 contacts. Keeping that many of the closest pairs loses none
-of them, and the cost grows with the number of bodies instead of its square.
+Disks that touch without overlapping form a planar graph (a coin graph), so N bodies
+have at most 3 N - 6 contacts. This number of closest pairs contains all contacts, and
+the cost grows with the number of bodies instead of its square.
 """
 
 from typing import NamedTuple
@@ -30,18 +30,18 @@ class _Pairs(NamedTuple):
 
 
 class _Stacked(NamedTuple):
-    """Properties with one axis over the bodies, so that pairs can be picked from it."""
+    """Properties with one axis over the bodies, for indexing by pairs."""
 
     radius: Array
     inverse_mass: Array
     inverse_inertia: Array
-    arm: Array  # of the disks alone
+    arm: Array  # disks only
 
 
 def contact_budget(body_count: int) -> int:
-    """Return how many pairs of bodies (the pusher included) can touch at once."""
+    """Return the largest number of contacts between bodies, the pusher included."""
     every = body_count * (body_count - 1) // 2
-    # A graph of two bodies has one edge, where the formula says none.
+    # Two bodies have one contact, although the formula gives zero.
     return min(every, max(3 * body_count - 6, 1))
 
 
@@ -98,8 +98,8 @@ def _closest(
     distance = jnp.hypot(x[second] - x[first], y[second] - y[first])
     gap = lax.stop_gradient(distance - radius[first] - radius[second])
     nearest = jnp.argsort(gap, axis=0)[: contact_budget(count)]
-    # In the order of all pairs: sweeps are few, so that their order shows, and which
-    # of two touching pairs is closer is a matter of rounding.
+    # In the order of all pairs: with few sweeps the order matters, and rounding decides
+    # which of two touching pairs is closer.
     nearest = jnp.sort(nearest, axis=0)
     pairs = _Pairs(jnp.asarray(first)[nearest], jnp.asarray(second)[nearest])
     contact = find_contact(

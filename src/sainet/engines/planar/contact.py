@@ -1,8 +1,8 @@
-"""Coulomb contact between two bodies: no bounce, no sinking in.
+"""Coulomb contact between two bodies, without restitution.
 
-A contact is kept by the velocity that it allows: bodies that are apart may close their
-gap within the step and no more (so that they never sink in), bodies that overlap are
-driven apart at a fixed share of the overlap each step.
+A contact constrains the relative velocity: separate bodies may close their gap within
+the step, but not overlap; overlapping bodies move apart by a fixed fraction of the
+overlap per step.
 """
 
 from typing import NamedTuple
@@ -14,11 +14,11 @@ from sainet.engines.planar.table import Twist
 
 
 class Contact(NamedTuple):
-    """Where two bodies may touch during a step, and how they answer an impulse."""
+    """Possible contact of two bodies in a step, with their response to impulses."""
 
     normal_x: Array  # from the first body to the second
     normal_y: Array
-    least_speed: Array  # m/s, at which the second must move away along the normal
+    least_speed: Array  # m/s, smallest separating velocity along the normal
     normal_mass: Array  # kg
     tangent_mass: Array  # kg
     friction: Array
@@ -27,7 +27,7 @@ class Contact(NamedTuple):
 
 
 class Side(NamedTuple):
-    """One of the two bodies of a contact."""
+    """Properties of one body of a contact."""
 
     radius: Array  # m
     inverse_mass: Array  # 1/kg
@@ -35,7 +35,7 @@ class Side(NamedTuple):
 
 
 class ContactImpulse(NamedTuple):
-    """What a contact did during a step."""
+    """Impulse of a contact during a step."""
 
     normal: Array  # N s
     tangent: Array  # N s
@@ -50,7 +50,7 @@ def find_contact(
     time_step: float,
     recovery: float,
 ) -> Contact:
-    """Return the contact of two bodies whose centres are `offset` (m) apart."""
+    """Return the contact of two bodies with the given offset of their centres (m)."""
     x, y = offset
     distance = jnp.sqrt(jnp.maximum(x * x + y * y, 1e-18))
     gap = distance - first.radius - second.radius
@@ -74,7 +74,7 @@ def find_contact(
 def solve_contact(
     contact: Contact, impulse: ContactImpulse, first: Twist, second: Twist
 ) -> tuple[ContactImpulse, Twist, Twist]:
-    """Update a contact's impulse and its bodies' velocities once."""
+    """Return a contact's impulse and its bodies' velocities after one update."""
     nx, ny = contact.normal_x, contact.normal_y
     x, y = second.x - first.x, second.y - first.y
     parting = x * nx + y * ny
@@ -99,7 +99,7 @@ def solve_contact(
 
 
 def _move(twist: Twist, side: Side, x: Array, y: Array, across: Array) -> Twist:
-    # The tangential impulse turns both bodies the same way: their arms are opposite.
+    # A tangential impulse rotates both bodies in the same sense: arms are opposite.
     return Twist(
         x=twist.x + side.inverse_mass * x,
         y=twist.y + side.inverse_mass * y,

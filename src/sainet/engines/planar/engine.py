@@ -1,4 +1,4 @@
-"""The planar engine: one step, and a rollout of many."""
+"""The planar engine: single steps and rollouts."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -24,17 +24,17 @@ from sainet.scenes.state import State, Trajectory
 class PlanarEngine(AbstractEngine):
     """Disks and a cylindrical pusher on a table, in JAX: batched and differentiable.
 
-    Semi-implicit Euler: the velocities at the end of a step obey Coulomb contact
-    between all pairs without bounce, and the ellipsoidal limit surface of each
-    pressed disk; then ``p(t+1) = p(t) + dt * v(t+1)``. It computes in the precision
-    of what it is given and holds no state of its own.
+    Semi-implicit Euler: the velocities at the end of a step satisfy Coulomb contact
+    without restitution between all pairs, and the ellipsoidal limit surface of each
+    pressed disk; then ``p(t+1) = p(t) + dt * v(t+1)``. The engine computes in the
+    precision of its inputs and is stateless.
     """
 
     # Mean distance of the pressure from the centre over the radius: 2/3 when it is
     # uniform, 1 when the disk rests on its rim.
     pressure_radius_ratio: float | Float[Array, ""] = 2 / 3
     sweeps: int = eqx.field(static=True, default=10)
-    recovery: float = eqx.field(static=True, default=0.08)  # share of an overlap
+    recovery: float = eqx.field(static=True, default=0.08)  # overlap fraction per step
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls."""
@@ -99,7 +99,7 @@ def _command(controls: Controls) -> Float[Array, "*batch time 2"]:
 def _drive(
     bodies: Bodies, controls: Controls, control: Array, time_step: float
 ) -> Bodies:
-    """Give the pusher the velocity that it has before it touches anything."""
+    """Return the bodies with the pusher's velocity before contact."""
     x, y = control[..., 0], control[..., 1]
     if isinstance(controls, PathControls):
         vx = (x - bodies.x[-1]) / time_step
@@ -118,7 +118,7 @@ def _drive(
 def _table_limits(
     scene: Scene, properties: Properties, bodies: Bodies
 ) -> tuple[Array, ...]:
-    """Return the greatest impulse of the table's friction on each disk (N s)."""
+    """Return the largest impulse of table friction on each disk (N s)."""
     impulse = properties.table_friction * scene.time_step
     limits = tuple(impulse * weight for weight in properties.weight)
     if scene.friction_field is None:
@@ -141,7 +141,7 @@ def _integrate(bodies: Bodies, twists: tuple[Twist, ...], time_step: float) -> B
 
 
 def _time_after_batch(states: State, batch_axes: int) -> State:
-    """Move the time axis of a scan behind the batch axes."""
+    """Return states with the time axis of a scan behind the batch axes."""
     return State(
         *(jnp.moveaxis(part, 0, batch_axes) for part in _leaves(states)),
     )

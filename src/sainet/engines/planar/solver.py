@@ -1,7 +1,7 @@
-"""Velocities that obey every contact and the table's friction at the end of a step.
+"""Velocities that satisfy all contacts and table friction at the end of a step.
 
-Projected Gauss-Seidel: a fixed number of sweeps, each of which updates the friction of
-every disk with the table and then every contact, from the last known impulses.
+Projected Gauss-Seidel with a fixed number of sweeps: each updates the table friction of
+every disk and then every contact, starting from the latest impulses.
 """
 
 from typing import NamedTuple
@@ -22,23 +22,23 @@ from sainet.engines.planar.table import TableImpulse, Twist, solve_table
 
 
 class Step(NamedTuple):
-    """The numbers of one step that all constraints share."""
+    """Settings of a step that all constraints share."""
 
     time_step: float  # s
-    recovery: float  # share of an overlap that is undone in a step
+    recovery: float  # fraction of an overlap that is corrected per step
     sweeps: int
 
 
 def solve_all_pairs(
     bodies: Bodies, properties: Properties, limits: tuple[Array, ...], step: Step
 ) -> tuple[Twist, ...]:
-    """Return the bodies' velocities; every pair of bodies is looked at.
+    """Return the bodies' velocities, with contacts between all pairs of bodies.
 
     Args:
         bodies: poses and velocities at the start of the step.
-        properties: of the same bodies.
-        limits: of the table's friction on each disk over the step, N s.
-        step: the numbers of the step.
+        properties: properties of the same bodies.
+        limits: largest impulse of table friction on each disk, N s.
+        step: settings of the step.
     """
     pairs = every_pair(len(bodies.x))
     contacts = [_static_contact(bodies, properties, pair, step) for pair in pairs]
@@ -67,12 +67,12 @@ def solve_all_pairs(
         tuple(TableImpulse(zero, zero, zero) for _ in disks),
         tuple(ContactImpulse(zero, zero) for _ in pairs),
     )
-    # The loop stays a loop: unrolled sweeps make XLA compile for minutes.
+    # Keep the loop: XLA compiles unrolled sweeps for minutes.
     return lax.fori_loop(0, step.sweeps, sweep, start)[0]
 
 
 def every_pair(count: int) -> list[tuple[int, int]]:
-    """List the pairs, the pusher's (the last body's) first: it drives the others."""
+    """Return all pairs, those of the pusher (the last body) first."""
     pusher = count - 1
     driven = [(pusher, disk) for disk in range(pusher)]
     return driven + [(i, j) for i in range(pusher) for j in range(i + 1, pusher)]

@@ -1,9 +1,9 @@
 """Friction between a pressed disk and the table.
 
-The limit surface (Goyal, Ruina and Papadopoulos 1991) is taken as an ellipsoid: the
-friction force f and torque tau obey ``(f / F)^2 + (tau / (F c))^2 <= 1`` with
+The limit surface (Goyal, Ruina and Papadopoulos 1991) is approximated by an ellipsoid:
+friction force f and torque tau satisfy ``(f / F)^2 + (tau / (F c))^2 <= 1`` with
 ``F = mu m g`` and c the mean distance of the pressure from the centre, 2/3 of the
-radius when it is uniform; a disk that slips dissipates as much as it can.
+radius for uniform pressure. Friction follows the principle of maximum dissipation.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from jaxtyping import Array
 
 
 class TableImpulse(NamedTuple):
-    """What the table did to a disk during a step; the torque is divided by its arm."""
+    """Friction impulse on a disk during a step; the torque is divided by its arm."""
 
     x: Array  # N s
     y: Array  # N s
@@ -22,7 +22,7 @@ class TableImpulse(NamedTuple):
 
 
 class Twist(NamedTuple):
-    """How a disk moves."""
+    """Velocity and spin of a disk."""
 
     x: Array  # m/s
     y: Array  # m/s
@@ -38,12 +38,11 @@ def solve_table(
     inverse_mass: Array,
     inverse_inertia: Array,
 ) -> tuple[TableImpulse, Twist]:
-    """Update a disk's friction impulse and velocity once.
+    """Return a disk's friction impulse and velocity after one update.
 
-    In the coordinates (f, tau / c) the ellipsoid is a ball of radius `limit` (N s),
-    so that the projection is a scaling and the fixed point is the friction of
-    greatest dissipation. The gain is the largest that is stable in translation and
-    rotation alike.
+    In the coordinates (f, tau / c) the ellipsoid is a ball of radius `limit` (N s), so
+    the projection is a scaling and the fixed point has maximum dissipation. The gain is
+    the largest that is stable in both translation and rotation.
     """
     response = jnp.maximum(inverse_mass, arm * arm * inverse_inertia)
     gain = 1 / response
