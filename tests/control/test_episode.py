@@ -146,7 +146,7 @@ def test_a_goal_out_of_reach_is_named_as_the_reason():
 def test_an_observation_with_nan_ends_the_episode():
     robot = Rail(step=float("nan"))
     episode = run(robot)
-    assert episode.reason == "nothing can be planned: observation: position holds NaN"
+    assert episode.reason == "planning failed: observation: position holds NaN"
     assert len(episode.turns) == 1
 
 
@@ -154,7 +154,7 @@ def test_a_model_without_finite_predictions_ends_the_episode():
     lost = eqx.tree_at(lambda task: task.goal, TASK, TASK.goal * jnp.nan)
     planner = GreedyPlanner(actions=FEW)
     episode = run_episode(Rail(), planner, MODEL, lost, scene())
-    told = "nothing can be planned: model: each of the 6 pushes that it predicted left"
+    told = "planning failed: model: none of the 6 candidate pushes is"
     assert episode.reason.startswith(told)
     assert episode.turns == []
 

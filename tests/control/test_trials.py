@@ -68,7 +68,7 @@ def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
     assert episode_file(out, 0).stat().st_mtime_ns == kept
     assert list(map(without_times, again)) == list(map(without_times, records))
     assert told == again
-    with pytest.raises(RunConflict, match="pushes is 2 there and 3 here"):
+    with pytest.raises(RunConflict, match="pushes is 2, not 3"):
         run_trials(replace(CONFIG, pushes=3), out)
 
 

@@ -114,7 +114,7 @@ def test_finished_runs_stay_unchanged(whole_store):
 
 def test_other_settings_conflict_and_touch_nothing(whole_store):
     before = contents(whole_store)
-    with pytest.raises(RunConflict, match="config.json: seed is 0 there and 1 here"):
+    with pytest.raises(RunConflict, match="config.json: seed is 0, not 1"):
         generate(small(seed=1), whole_store)
     assert contents(whole_store) == before
 

@@ -133,7 +133,7 @@ def test_other_settings_conflict_and_touch_nothing(tmp_path, other):
 
 def test_foreign_folders_conflict_and_stay_unchanged(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(RunConflict, match="not empty and no run of sainet"):
+    with pytest.raises(RunConflict, match="not a sainet run folder"):
         open_here(tmp_path)
     assert files(tmp_path) == {"thesis.tex": b"years of work"}
     with pytest.raises(RunConflict, match="is a file"):
@@ -179,7 +179,7 @@ def test_a_run_folder_is_locked_by_its_process(tmp_path):
         assert other.stdout.readline() == b"at work\n"
         (folder / ".weights.0.partial").write_text("half")  # is being written
         before = files(tmp_path)
-        with pytest.raises(RunConflict, match="another sainet is at work there"):
+        with pytest.raises(RunConflict, match="another sainet process is using this folder"):
             open_here(folder)
         assert files(tmp_path) == before
         (folder / "done").write_text("")

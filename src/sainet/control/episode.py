@@ -1,4 +1,4 @@
-"""Closed loop: observe, plan, push, observe, until solved or out of pushes."""
+"""Closed loop: observe, plan, push, until the task is solved or no push is left."""
 
 import time
 from collections.abc import Callable
@@ -30,7 +30,7 @@ _TOLERANCES = (
 
 @dataclass(frozen=True)
 class Turn:
-    """One decision and the push that followed."""
+    """A control step: one decision and its push."""
 
     observed: State
     plan: Plan
@@ -40,11 +40,11 @@ class Turn:
 
 @dataclass
 class Episode:
-    """Everything that happened on the way to a goal."""
+    """An episode: its control steps, the last observation and the reason of its end."""
 
     turns: list[Turn] = field(default_factory=list)
-    final: State | None = None  # as it was last observed
-    reason: str = "interrupted"  # why it ended
+    final: State | None = None  # last observation
+    reason: str = "interrupted"  # why the episode ended
 
 
 def run_episode(
@@ -58,20 +58,20 @@ def run_episode(
     episode: Episode | None = None,
     on_turn: Callable[[Turn], None] = lambda turn: None,
 ) -> Episode:
-    """Push until the task is solved.
+    """Return an episode, which ends when the task is solved or no push is left.
 
     Args:
-        robot: observes and pushes.
-        planner: decides.
-        dynamics: what it predicts with.
-        task: when is it solved.
-        scene: as model and task are to believe it.
-        pushes: after so many it is given up.
-        episode: filled while it goes on, so that an interruption leaves what there is.
-        on_turn: told of each push.
+        robot: observes and executes pushes.
+        planner: selects pushes.
+        dynamics: model that predicts.
+        task: task to solve.
+        scene: properties given to model and task.
+        pushes: maximum number of pushes.
+        episode: filled during the episode, so that an interruption keeps its steps.
+        on_turn: called after each push.
 
     Returns:
-        The episode; its reason is `solved`, `out of pushes`, or what went wrong.
+        The episode; its reason is `solved`, `out of pushes`, or the failure.
     """
     episode = episode or Episode()
     troubles = 0
@@ -85,7 +85,7 @@ def run_episode(
         try:
             plan = planner.plan(dynamics, task, scene, state)
         except (BadScene, Diverged) as error:
-            return _end(episode, f"nothing can be planned: {error}")
+            return _end(episode, f"planning failed: {error}")
         seconds = time.perf_counter() - start
         recording = checked(robot.push(plan.pushes[0]), plan.pushes[0])
         turn = Turn(state, plan, recording, seconds)
@@ -120,7 +120,7 @@ def checked(recording: Recording, planned: Push) -> Recording:
 def _out_of_pushes(
     task: AbstractTask, planner: AbstractPlanner, episode: Episode, pushes: int
 ) -> str:
-    """Say that the pushes are used up, and whether they could ever have been enough."""
+    """Return the reason of a truncated episode, and whether the goal was in reach."""
     reach = pushes * planner.actions.length
     away = float(task.distance(episode.turns[0].observed))
     if reach >= away:
@@ -139,7 +139,7 @@ def _end(episode: Episode, reason: str) -> Episode:
 def distances(
     task: AbstractTask, episode: Episode
 ) -> Float[np.ndarray, " observation"]:
-    """Return how far the task was from solved (m) before each push and at the end."""
+    """Return the remaining distances before each push and at the end (m)."""
     states = [turn.observed for turn in episode.turns]
     states += [episode.final] if episode.final is not None else []
     return np.array([float(task.distance(state)) for state in states])

@@ -1,4 +1,4 @@
-"""An episode as JSON values: what was decided, predicted and seen at every push."""
+"""Records of episodes as JSON: decisions, predictions and observations of each push."""
 
 import math
 from pathlib import Path
@@ -22,8 +22,8 @@ def record(
 ) -> dict[str, Any]:
     """Return the record of an episode; lengths in mm, angles in degrees.
 
-    `solved` is judged by where the disk truly is, not by where it was seen: sight is
-    as noisy as everything else. What left the finite numbers is None.
+    `solved` uses the true final pose, not the measured pose, which is noisy. NaN and
+    infinity are None.
     """
     task, robot = trial.task, trial.robot
     final = 1000 * float(task.distance(robot.truth))
@@ -49,18 +49,18 @@ def record(
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Read the record of an episode.
+    """Return the record of an episode.
 
     Raises:
-        BadInput: it is damaged, or no such record.
+        BadInput: the file is damaged or not an episode.
     """
-    again = "delete it and run the same command: that episode is run again"
+    again = "delete it and run the same command to repeat this episode"
     try:
         found = read_json(path)
     except BadInput as error:
         raise BadInput(f"{error} Or {again}.") from None
     if wrong := flaw(found, path.stem):
-        raise BadInput(f"{path}: {wrong}, so it is no episode; {again}.")
+        raise BadInput(f"{path}: not a valid episode, {wrong}; {again}.")
     return found
 
 
@@ -87,14 +87,14 @@ def _turn(trial: Trial, turn: Turn) -> dict[str, Any]:
 
 
 def poses_of(state: State) -> np.ndarray:
-    """Return each disk's place and angle, ``[body, 3]`` (m, m, rad)."""
+    """Return the pose of each disk, ``[body, 3]`` (m, m, rad)."""
     return np.concatenate(
         [np.asarray(state.position), np.asarray(state.angle)[..., None]], axis=-1
     )
 
 
 def _finite_or_none(value: Any) -> Any:  # noqa: ANN401
-    """Return JSON values with null for numbers that JSON has not."""
+    """Return JSON values with null for NaN and infinity."""
     if isinstance(value, dict):
         return {name: _finite_or_none(each) for name, each in value.items()}
     if isinstance(value, list):
@@ -104,7 +104,7 @@ def _finite_or_none(value: Any) -> Any:  # noqa: ANN401
 
 
 def _poses(pose: np.ndarray) -> list:
-    """Return x and y in mm and the angle in degrees, to a hundredth."""
+    """Return x and y in mm and the angle in degrees, rounded to 0.01."""
     units = np.array([1000, 1000, np.rad2deg(1)])
     return np.round(np.asarray(pose, np.float64) * units, 2).tolist()
 

@@ -1,4 +1,4 @@
-"""What an episode's record has to hold before anything is drawn or summed up."""
+"""Checks of the record of an episode before it is drawn or summarised."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from sainet.runs.documents import is_number
 
-Axis = int | str  # a length, or the name of one: those of one name are equal
+Axis = int | str  # a length, or the name of a length; equal names have equal lengths
 
 _TYPES: dict[str, type] = {
     **{"trial": int, "model": str, "goals": str, "reason": str, "solved": bool},
@@ -17,7 +17,7 @@ _NUMBERS: dict[str, tuple[Axis, ...]] = {
     **{"pusher_radius_mm": (), "tolerance_mm": (), "table_friction": ()},
     **{"goal_mm": (2,), "radius_mm": ("disk",), "decision_s": ("decision",)},
 }
-# Where things were: null stands for what left the finite numbers.
+# Poses: null stands for NaN and infinity.
 _PLACES: dict[str, tuple[Axis, ...]] = {"final_mm": (), "final": ("disk", 3)}
 _TURN_PLACES: dict[str, tuple[Axis, ...]] = {
     **{"observed": ("disk", 3), "distance_mm": (), "planned": ("plan", "disk", 3)},
@@ -26,17 +26,17 @@ _TURN_PLACES: dict[str, tuple[Axis, ...]] = {
 
 
 def flaw(found: Mapping[str, Any], name: str) -> str | None:
-    """Return why this is no record of an episode, if it is none.
+    """Return why a record is invalid, or None if it is valid.
 
     Args:
-        found: what its file holds.
-        name: of the file, without its suffix: the number of the trial.
+        found: content of the file.
+        name: name of the file without its suffix, the number of the trial.
     """
     for field, kind in _TYPES.items():
         if type(found.get(field)) is not kind:  # True is an int, too
             return _named(found, field, f"of type {kind.__name__}")
     if f"{found['trial']:03d}" != name:
-        return f"trial is {found['trial']}, which is another episode"
+        return f"trial is {found['trial']}, another episode"
     lengths: dict[str, int] = {}
     flawed = _misfit(found, _NUMBERS, lengths)
     flawed = flawed or _misfit(found, _PLACES, lengths, may_be_null=True)
@@ -57,13 +57,13 @@ def _misfit(
     *,
     may_be_null: bool = False,
 ) -> str | None:
-    """Return what has not the shape that it should have, if anything.
+    """Return the first field with a wrong shape, or None.
 
     Args:
         found: lists of numbers by name.
-        shapes: that they should have.
-        lengths: of the axes that are known; those that are found are added.
-        may_be_null: whether null may stand for a number.
+        shapes: required shapes by name.
+        lengths: known lengths of axes; new lengths are added.
+        may_be_null: whether null may replace a number.
     """
     for name, axes in shapes.items():
         values = np.asarray(found.get(name, "missing"), object)
@@ -78,7 +78,7 @@ def _misfit(
 def _fits(
     shape: tuple[int, ...], axes: tuple[Axis, ...], lengths: dict[str, int]
 ) -> bool:
-    """Return whether a shape has these axes; lengths that are new become known."""
+    """Return whether a shape has these axes; new lengths are added."""
     return len(shape) == len(axes) and all(
         length == (axis if isinstance(axis, int) else lengths.setdefault(axis, length))
         for length, axis in zip(shape, axes, strict=True)

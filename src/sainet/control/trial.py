@@ -1,4 +1,4 @@
-"""One trial: a goal, and the world that it lies in."""
+"""Trials: a goal and the simulated world of one episode."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
 from sainet.worlds.noise_config import NoiseConfig, at_level
 
-# The disks that are pushed: unlike those that the assumed engine believes in.
+# True properties of the disks, which differ from the assumed properties.
 MASS = (0.9, 1.0)  # kg
 RADIUS = (0.054, 0.059)  # m
 CONTACT_FRICTION, PUSHER_RADIUS = 0.25, 0.0048
@@ -25,7 +25,7 @@ _WORLD = 0x3071D
 
 
 class Trial(NamedTuple):
-    """One goal and the world that it lies in."""
+    """One goal and the simulated world of its episode."""
 
     robot: SimulatedRobot
     task: PushToGoal
@@ -33,7 +33,7 @@ class Trial(NamedTuple):
 
 
 def make_trial(config: ControlConfig, index: int) -> Trial:
-    """Draw the world and the goal of one trial; models and planners see the same."""
+    """Return the world and the goal of one trial, equal for all models and planners."""
     rng = np.random.default_rng([_WORLD, config.seed, index])
     true = _scene(MASS, RADIUS, config.disks, float(rng.uniform(*_TABLE_FRICTION)))
     state = _in_a_row(np.asarray(true.radius))
@@ -65,7 +65,7 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
 def _scene(
     mass: tuple[float, ...], radius: tuple[float, ...], disks: int, friction: float
 ) -> Scene:
-    """Return a scene; disks beyond the second have the mean of both."""
+    """Return a scene; disks beyond the second have the mean of both values."""
 
     def each(values: tuple[float, ...]) -> jax.Array:
         mean = sum(values) / len(values)

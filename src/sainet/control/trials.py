@@ -35,19 +35,19 @@ def run_trials(
     executor: Executor | None = None,
     on_episode: Told = lambda episode: None,
 ) -> list[dict[str, Any]]:
-    """Push to every goal, or go on with what is missing; returns the records.
+    """Return the records of all trials; only missing episodes are run.
 
     Args:
         config: model, planner, world and goals.
-        out: the run folder; an episode is a file in it.
-        executor: runs the episodes; None runs them here, one by one.
-        on_episode: told each record when it is there.
+        out: the run folder, with one file per episode.
+        executor: runs the episodes; None runs them in this process, one by one.
+        on_episode: called with each record when it is available.
 
     Raises:
-        RunConflict: the folder holds something else.
-        BadInput: the model cannot be used for such pushes, or an episode is damaged.
+        RunConflict: the folder belongs to another run.
+        BadInput: the model is for other pushes, or an episode is damaged.
     """
-    model, _ = prepare(config)  # what is wrong is said before anything is made
+    model, _ = prepare(config)  # report errors before any output
     settings = {"command": "control", "weights": model.digest, **asdict(config)}
     folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     files = [episode_file(out, trial) for trial in range(config.trials)]
@@ -64,14 +64,14 @@ def run_trials(
 
 
 def episode_file(out: Path, trial: int) -> Path:
-    """Return where the record of an episode is kept."""
+    """Return the path of the record of an episode."""
     return out / FOLDER / f"{trial:03d}.json"
 
 
 def run_trial(config: ControlConfig, out: Path, index: int) -> int:
-    """Run and record one episode; what a worker does. Returns the index.
+    """Run and record one episode (the job of a worker) and return its index.
 
-    An interrupted episode leaves its record beside, under another name.
+    The record of an interrupted episode has another name.
     """
     model, planner = prepare(config)
     trial, episode = make_trial(config, index), Episode()
@@ -97,10 +97,10 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
 
 
 def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
-    """Load model and planner; loading the same model again compiles nothing.
+    """Return model and planner; loading the same model again compiles nothing.
 
     Raises:
-        BadInput: model, planner or world cannot be had, or not for such pushes.
+        BadInput: model, planner or world is unknown, or the model is for other pushes.
     """
     model = load_model(config.model)
     model.check_fits("robot", TIME_STEP)

@@ -1,1 +1,1 @@
-"""Things that observe disks and execute pushes."""
+"""Robots, which observe disks and execute pushes."""

@@ -1,4 +1,4 @@
-"""What every robot can do."""
+"""The interface of robots."""
 
 from abc import ABC, abstractmethod
 
@@ -8,7 +8,7 @@ from sainet.scenes.state import State
 
 
 class AbstractRobot(ABC):
-    """Observes disks at rest and pushes the first one."""
+    """A robot, which observes disks at rest and pushes disk 1."""
 
     @abstractmethod
     def observe(self) -> State:
@@ -16,7 +16,7 @@ class AbstractRobot(ABC):
 
     @abstractmethod
     def push(self, push: Push) -> Recording:
-        """Execute a push from the last observation, and wait until everything rests.
+        """Execute a push from the last observation, and wait until all bodies rest.
 
         Returns:
             A recording with the commanded push; its first sample is the start.

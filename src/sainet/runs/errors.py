@@ -1,4 +1,4 @@
-"""The few errors of the package: each message is one line that names the way out."""
+"""Errors of the package: each message is one line that names a remedy."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -7,19 +7,19 @@ _LONGEST_SHOWN = 60  # characters of a quoted value
 
 
 class SainetError(Exception):
-    """Something that the user can act upon; the command line exits with 1."""
+    """Error that the user can act on; the command line exits with status 1."""
 
     exit_status = 1
 
 
 class BadInput(SainetError):
-    """What was given cannot be used; the command line exits with 2."""
+    """Input that cannot be used; the command line exits with status 2."""
 
     exit_status = 2
 
 
 class BadScene(BadInput):
-    """A scene that cannot exist: a mass or radius that is not positive, say."""
+    """An impossible scene, for example with a negative mass."""
 
 
 class BadStore(BadInput):
@@ -40,19 +40,19 @@ class BadCheckpoint(BadInput):
 
 
 class RunConflict(BadInput):
-    """A folder already holds something other than what was asked for."""
+    """A folder that belongs to another run or process."""
 
 
 class UnknownName(BadInput):
-    """A name that no registry holds."""
+    """A name that is not registered."""
 
 
 class MissingExtra(BadInput):
-    """What was asked for needs a package that is not installed."""
+    """A request that needs a package that is not installed."""
 
 
 class Diverged(SainetError):
-    """A rollout or a training run left the finite numbers."""
+    """A rollout or training run that produced NaN or infinity."""
 
 
 class BadSetting(BadInput):
@@ -63,12 +63,12 @@ class BadSetting(BadInput):
     """
 
     def __init__(self, name: str, value: object, wanted: str) -> None:
-        """Keep the parts of the message.
+        """Store the parts of the message.
 
         Args:
-            name: of the argument or field.
-            value: that was given.
-            wanted: the values that can be used: "at least 1".
+            name: name of the argument or field.
+            value: given value.
+            wanted: accepted values, for example "at least 1".
         """
         super().__init__(name, value, wanted)
         self.name = name
@@ -81,25 +81,25 @@ class BadSetting(BadInput):
 
 
 def require(condition: bool, name: str, wanted: str, value: object) -> None:
-    """Raise `BadSetting` unless a condition on a setting's value holds."""
+    """Raise `BadSetting` unless a condition on the value of a setting holds."""
     if not condition:
         raise BadSetting(name, value, wanted)
 
 
 def require_one_of(name: str, value: str, known: Iterable[str]) -> None:
-    """Raise `BadSetting`, with the nearest name, for a name that is not known."""
+    """Raise `BadSetting`, with the nearest name, for an unknown name."""
     known = tuple(known)
     if value not in known:
         raise BadSetting(name, value, f"one of {', '.join(known)}{hint(value, known)}")
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownName:
-    """Return the error for a name that is not among the known ones.
+    """Return the error for an unknown name.
 
     Args:
-        kind: of the thing that has the name: "engine".
-        name: that was given.
-        known: every name of that kind.
+        kind: kind of the named object, for example "engine".
+        name: given name.
+        known: all names of this kind.
     """
     known = sorted(known)
     return UnknownName(
@@ -109,13 +109,13 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownName:
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """Return " (did you mean ...?)" for the known name that resembles a name most."""
+    """Return " (did you mean ...?)" with the most similar known name, or nothing."""
     nearest = get_close_matches(name[:_LONGEST_SHOWN], tuple(known), n=1)
     return f" (did you mean {nearest[0]}?)" if nearest else ""
 
 
 def shown(value: object, most: int | None = _LONGEST_SHOWN) -> str:
-    """Return a value as part of a line: printable, at most so many characters."""
+    """Return a value as printable text for a message, cut to a number of characters."""
     try:
         text = str(value)
     except (ValueError, RecursionError):  # an integer of thousands of digits

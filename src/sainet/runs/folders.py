@@ -1,4 +1,4 @@
-"""Run folders: one command's settings, manifest and outputs, resumable."""
+"""Run folders: settings, manifest and outputs of one command, resumable."""
 
 import json
 from collections.abc import Mapping
@@ -26,29 +26,29 @@ class RunFolder:
 
     path: Path
     finished_by: str
-    # Held as long as whoever works there keeps this.
+    # Held as long as this object exists.
     lock: FolderLock | None = field(default=None, compare=False, repr=False)
 
     @property
     def is_finished(self) -> bool:
-        """Whether an earlier run with the same settings went to its end."""
+        """Whether a run with the same settings has finished."""
         return (self.path / self.finished_by).is_file()
 
 
 def open_run(
     path: Path, config: Mapping[str, Any], *, finished_by: str, devices: int = 0
 ) -> RunFolder:
-    """Make a run folder or come back to one with the same settings.
+    """Return a new run folder, or the existing one with the same settings.
 
     Args:
-        path: the folder; made when missing.
-        config: the settings that decide what the run makes, as JSON values.
+        path: the folder; created if missing.
+        config: the settings that determine the output, as JSON values.
         finished_by: the file, relative to the folder, that the run writes last.
-        devices: of JAX, when the result depends on their number.
+        devices: number of JAX devices, if the output depends on it.
 
     Raises:
-        RunConflict: the folder holds something else, or another process works there;
-            nothing was touched.
+        RunConflict: the folder belongs to another run, or another process uses it;
+            nothing was changed.
     """
     wanted = json.loads(to_json(dict(config)))
     folder = RunFolder(path, finished_by)
@@ -57,7 +57,7 @@ def open_run(
     try:
         folder = replace(folder, lock=_lock(path))
     except RunConflict:
-        if folder.is_finished:  # there is nothing to write any more
+        if folder.is_finished:  # nothing remains to be written
             return folder
         raise
     for leftover in path.glob(".*.partial"):
@@ -71,13 +71,13 @@ def open_run(
 
 
 def _lock(path: Path) -> FolderLock | None:
-    """Make the folder, if need be, and keep other processes from working there."""
+    """Return the lock of the folder, which is created if missing."""
     try:
         path.mkdir(parents=True, exist_ok=True)
         return lock_folder(path)
     except BlockingIOError:
         raise RunConflict(
-            f"{path}: another sainet is at work there; wait until it has ended, or "
+            f"{path}: another sainet process is using this folder; wait for it, or "
             "choose another `out`."
         ) from None
     except OSError as error:
@@ -85,22 +85,22 @@ def _lock(path: Path) -> FolderLock | None:
 
 
 def remake(path: Path) -> str:
-    """Say how to make a damaged run again: a finished one is left alone."""
+    """Return how to repeat a damaged run: finished runs stay unchanged otherwise."""
     return f"delete {path}, then run the command that made it again"
 
 
 def _check_free(path: Path, wanted: dict[str, Any]) -> None:
-    """Check that a folder is missing, empty, or of a run with these settings."""
+    """Raise `RunConflict` unless a folder is free or has the same settings."""
     if path.exists() and not path.is_dir():
-        raise RunConflict(f"{path}: is a file; give `out` a folder.")
+        raise RunConflict(f"{path}: is a file; choose a folder as `out`.")
     if (path / CONFIG).exists():
         _check_same(path, read_json(path / CONFIG, RunConflict), wanted)
     elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
-        raise RunConflict(f"{path}: is not empty and no run of sainet; choose another.")
+        raise RunConflict(f"{path}: not a sainet run folder; choose an empty folder.")
 
 
 def _may_be_left(entry: Path) -> bool:
-    """Whether this is what a run that was killed as it began leaves behind."""
+    """Return whether a file may remain from a run killed at its start."""
     return entry.name == MANIFEST or entry.name.endswith(".partial")
 
 
@@ -108,8 +108,8 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
     for name in sorted(found.keys() | wanted.keys()):
         if found.get(name) != wanted.get(name):
             raise RunConflict(
-                f"{path / CONFIG}: {name} is {found.get(name)!r} there and "
-                f"{wanted.get(name)!r} here; choose another `out` or the same settings."
+                f"{path / CONFIG}: {name} is {found.get(name)!r}, not "
+                f"{wanted.get(name)!r}; choose another `out` or the same settings."
             )
 
 

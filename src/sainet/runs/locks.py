@@ -1,4 +1,4 @@
-"""Folders that one process at a time works in."""
+"""Locks on folders, so that one process at a time writes to each."""
 
 import os
 from pathlib import Path
@@ -6,18 +6,18 @@ from weakref import WeakValueDictionary, finalize
 
 try:
     import fcntl
-except ImportError:  # no POSIX: folders are not guarded there
+except ImportError:  # without POSIX, folders are not locked
     fcntl = None
 
 
 class FolderLock:
-    """The right to work in a folder; other processes wait for its end to get it.
+    """Exclusive lock on a folder.
 
-    It ends with the last reference to it, and with the process, even by `kill -9`.
+    It is released with its last reference and with the process, even by `kill -9`.
     """
 
     def __init__(self, descriptor: int) -> None:
-        """Have the lock that a descriptor holds."""
+        """Take over the lock of a file descriptor."""
         finalize(self, os.close, descriptor)
 
 
@@ -25,13 +25,13 @@ _held: WeakValueDictionary[str, FolderLock] = WeakValueDictionary()
 
 
 def lock_folder(folder: Path) -> FolderLock | None:
-    """Return the lock of a folder, or None where there are no locks to be had.
+    """Return the lock of a folder, or None if the system has no locks.
 
-    Who has it in this process already gets the same again: after an exception, say,
-    whose traceback keeps it.
+    A lock that this process already holds is returned again, for example after an
+    exception whose traceback keeps it.
 
     Raises:
-        BlockingIOError: another process has it.
+        BlockingIOError: another process holds the lock.
     """
     place = os.path.realpath(folder)
     if (known := _held.get(place)) is not None:
@@ -45,6 +45,6 @@ def lock_folder(folder: Path) -> FolderLock | None:
         os.close(descriptor)
         if isinstance(error, BlockingIOError):
             raise
-        return None  # a disk that knows no locks
+        return None  # the file system has no locks
     lock = _held[place] = FolderLock(descriptor)
     return lock

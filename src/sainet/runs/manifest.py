@@ -1,4 +1,4 @@
-"""What a run was made with: versions, commit and hardware."""
+"""Manifests: versions, commit and hardware of a run."""
 
 import os
 import platform
@@ -15,7 +15,7 @@ MANIFEST = "manifest.json"
 
 
 def manifest(devices: int = 0) -> dict[str, Any]:
-    """Return by what a run was made: versions, commit and hardware, no dates."""
+    """Return versions, commit and hardware, without dates."""
     names = ("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr")
     return {
         "format_version": FORMAT_VERSION,
@@ -52,7 +52,7 @@ def _git_commit() -> str | None:
 
 
 def processor() -> str:
-    """Return the name of this machine's processor."""
+    """Return the name of the processor of this machine."""
     with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
             if line.startswith("model name"):

@@ -1,7 +1,7 @@
-"""Objects by name, loaded when they are asked for.
+"""Objects by name, loaded on request.
 
-A table leads from each name to ``module:attribute``, so that listing names loads no
-JAX, and an extra that is missing matters only when its name is asked for.
+A table maps each name to ``module:attribute``, so that listing names does not import
+JAX, and a missing extra matters only when its name is requested.
 """
 
 from collections.abc import Mapping
@@ -12,15 +12,15 @@ from sainet.runs.errors import unknown_name
 
 
 def load_named(kind: str, table: Mapping[str, str], name: str) -> Any:  # noqa: ANN401
-    """Return the attribute that belongs to a name.
+    """Return the object with a name.
 
     Args:
-        kind: of the objects, for the message: "engine".
-        table: from names to ``module:attribute``.
-        name: to look up.
+        kind: kind of the objects for the message, for example "engine".
+        table: maps names to ``module:attribute``.
+        name: name to look up.
 
     Raises:
-        UnknownName: the table has no such name.
+        UnknownName: the table does not contain the name.
     """
     if name not in table:
         raise unknown_name(kind, name, table)

@@ -1,4 +1,4 @@
-"""Processes of this machine: how many pay, and workers that end with their parent."""
+"""Worker processes: a pool with one per core, which ends with its parent."""
 
 import multiprocessing
 import os
@@ -16,13 +16,13 @@ from typing import Any, final
 from sainet.runs.errors import BadSetting, SainetError
 from sainet.runs.interrupts import remember_interrupt
 
-# What a failure sends to the workers of its own pool. Those of a background job ignore
-# SIGINT, which a shell means for what stands in the foreground.
+# Signal that a failure sends to the workers of its pool. Workers of background jobs
+# ignore SIGINT, which a shell sends to foreground jobs.
 _FAILURE = getattr(signal, "SIGUSR1", signal.SIGINT)
 
 
 def core_count() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores available to this process."""
     if hasattr(os, "sched_getaffinity"):  # on Linux
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -30,13 +30,13 @@ def core_count() -> int:
 
 @contextmanager
 def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Executor]:
-    """Give a pool of processes, as many as there are cores by default.
+    """Yield a pool of processes, by default one per core.
 
-    Ctrl-C, or any failure here, reaches the jobs under way as `KeyboardInterrupt`, so
-    that they may keep what they have; none begins after it.
+    Ctrl-C and any failure here raise `KeyboardInterrupt` in the running jobs, which may
+    save their state; no further job starts.
 
     Args:
-        workers: how many processes.
+        workers: number of processes.
         core_each: see `spawned_pool`.
 
     Raises:
@@ -48,7 +48,7 @@ def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Exe
     try:
         yield pool
     except KeyboardInterrupt:
-        # A terminal tells every process; whoever signals this one alone does not.
+        # A terminal signals every process, but `kill` signals only this one.
         for process in multiprocessing.active_children():
             if process.pid is not None:
                 _signal(process.pid, signal.SIGINT)
@@ -63,12 +63,12 @@ def worker_pool(workers: int | None, *, core_each: bool = False) -> Iterator[Exe
 def spawned_pool(workers: int, *, core_each: bool = False) -> "InterruptibleExecutor":
     """Return a pool of processes that end with this one, quietly at Ctrl-C.
 
-    Spawned, not forked: a process that is forked after JAX has started hangs.
+    Spawned, not forked: processes forked after the start of JAX hang.
 
     Args:
-        workers: how many processes.
-        core_each: keep each to a core of its own, where the system can. To what runs
-            there this is a machine of one core, which spares it threads.
+        workers: number of processes.
+        core_each: bind each process to a core of its own, if the system supports this.
+            Its jobs then run as on a machine with one core, without extra threads.
     """
     context = multiprocessing.get_context("spawn")
     cores = context.SimpleQueue()
@@ -82,21 +82,21 @@ def spawned_pool(workers: int, *, core_each: bool = False) -> "InterruptibleExec
 
 
 def _cores() -> list[int]:
-    """Return the cores that processes can be kept to; none where they cannot."""
+    """Return the cores that processes can be bound to; empty without support."""
     return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
 
 
 @final
 class InterruptibleExecutor(Executor):
-    """Does jobs in a pool of processes; none begins in an interrupted one."""
+    """Executor on a pool of processes; interrupted processes start no further jobs."""
 
     def __init__(self, pool: ProcessPoolExecutor, begun: "SimpleQueue[int]") -> None:
-        """Have the pool, and what tells the numbers of its processes."""
+        """Store the pool and the queue of its process ids."""
         self._pool = pool
         self._begun = begun
 
     def interrupt(self) -> None:
-        """Have the jobs under way end as at Ctrl-C, and no more begin."""
+        """End the running jobs as at Ctrl-C, and start no further jobs."""
         while not self._begun.empty():
             _signal(self._begun.get(), _FAILURE)
 
@@ -107,7 +107,7 @@ class InterruptibleExecutor(Executor):
         *arguments: Any,  # noqa: ANN401
         **named: Any,  # noqa: ANN401
     ) -> Future[Any]:
-        """Have a job done."""
+        """Return the future of a job."""
         return self._pool.submit(_do, work, *arguments, **named)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -117,25 +117,25 @@ class InterruptibleExecutor(Executor):
 
 @dataclass
 class _WorkerState:
-    """What a signal finds this worker at."""
+    """State of this worker when a signal arrives."""
 
     is_busy: bool = False
     is_interrupted: bool = False
 
 
-_worker = _WorkerState()  # one a process, as signal handlers are
+_worker = _WorkerState()  # one per process, like signal handlers
 
 
 def _signal(process: int, number: int) -> None:
-    with suppress(ProcessLookupError):  # it may have ended meanwhile
+    with suppress(ProcessLookupError):  # the process may have ended
         os.kill(process, number)
 
 
 def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
     end_with_parent()
-    if not cores.empty():  # one waits for each worker, or none for any
+    if not cores.empty():  # holds one core per worker, or none
         os.sched_setaffinity(0, {cores.get()})
-    # A shell has its background jobs ignore the signal; so do their workers.
+    # Background jobs of a shell ignore the signal, and so do their workers.
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _interrupt)
     signal.signal(_FAILURE, _interrupt)
@@ -143,10 +143,10 @@ def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
 
 
 def _interrupt(number: int, frame: object) -> None:
-    """End the job under way, once: a second signal finds it keeping what it has.
+    """End the running job once: at a second signal it may be saving its state.
 
-    An idle worker stays: to the pool its end would be a failure, for which the pool
-    kills the others.
+    An idle worker stays alive: the pool would treat its end as a failure and kill the
+    other workers.
     """
     is_first = not _worker.is_interrupted
     _worker.is_interrupted = True
@@ -156,7 +156,7 @@ def _interrupt(number: int, frame: object) -> None:
 
 
 def _do(work: Callable[..., Any], *arguments: Any, **named: Any) -> Any:  # noqa: ANN401
-    """Do a job, unless this worker was interrupted: more may be waiting for it."""
+    """Return the result of a job, unless this worker was interrupted before."""
     _worker.is_busy = True
     try:
         if _worker.is_interrupted:
@@ -169,15 +169,15 @@ def _do(work: Callable[..., Any], *arguments: Any, **named: Any) -> Any:  # noqa
 def each_done(
     executor: Executor | None, work: Callable[..., int], jobs: Sequence[tuple[Any, ...]]
 ) -> Iterator[int]:
-    """Yield what each job returns, when it is done.
+    """Yield the result of each job when it is finished.
 
     Args:
-        executor: does the jobs; None does them here, one by one.
-        work: a function of a module; it returns the index of its job.
+        executor: runs the jobs; None runs them in this process, one by one.
+        work: a module-level function that returns the index of its job.
         jobs: the arguments of each call.
 
     Raises:
-        SainetError: a worker was ended from outside.
+        SainetError: a worker was killed.
     """
     if executor is None:
         for job in jobs:
@@ -196,15 +196,15 @@ def each_done(
 
 
 def worker_lost() -> SainetError:
-    """Say that a worker of a pool was ended, most often by a system out of memory."""
+    """Return the error for a killed worker, usually the result of too little memory."""
     return SainetError(
-        "a worker process was ended, probably for want of memory; the same command "
-        "goes on from here: give it fewer workers or smaller chunks."
+        "a worker process was killed, probably because memory ran out; run the same "
+        "command with fewer workers or smaller chunks to resume."
     )
 
 
 def end_with_parent() -> None:
-    """End this worker when its parent dies, even of `kill -9`: nobody else would."""
+    """End this worker when its parent dies, even by `kill -9`."""
     parent = multiprocessing.parent_process()
     if parent is None:
         return

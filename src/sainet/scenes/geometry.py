@@ -12,7 +12,7 @@ def unit(angle: Float[Array, "*batch"]) -> Float[Array, "*batch 2"]:
 def rotate(
     vector: Float[Array, "*batch 2"], angle: Float[Array, "*#batch"]
 ) -> Float[Array, "*batch 2"]:
-    """Turn vectors counter-clockwise by an angle (rad)."""
+    """Return vectors rotated counter-clockwise by an angle (rad)."""
     cosine, sine = jnp.cos(angle), jnp.sin(angle)
     x, y = vector[..., 0], vector[..., 1]
     return jnp.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
@@ -26,10 +26,10 @@ def direction(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
 def norm(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
     """Return the length of vectors; its gradient at zero is zero, never NaN."""
     squared = jnp.sum(vector * vector, axis=-1)
-    nonzero = squared != 0  # NaN, too: its length is NaN
+    nonzero = squared != 0  # also NaN, whose length is NaN
     return jnp.where(nonzero, jnp.sqrt(jnp.where(nonzero, squared, 1.0)), 0.0)
 
 
 def wrap_angle(angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
-    """Bring angles (rad) into [-pi, pi)."""
+    """Return angles wrapped into [-pi, pi) (rad)."""
     return jnp.mod(angle + jnp.pi, 2 * jnp.pi) - jnp.pi

@@ -1,7 +1,7 @@
-"""Disks on a table and the cylinder that pushes them: everything static.
+"""Static properties of disks on a table and of the pusher.
 
 Units are metres, radians, kilograms and seconds, in the table frame. Leading batch axes
-are optional; the number of disks is any number from one up.
+are optional; there is at least one disk.
 """
 
 import equinox as eqx
@@ -18,11 +18,11 @@ TIME_STEP = 1 / 240  # s, the paper's
 
 
 class FrictionField(eqx.Module):
-    """A Gaussian random field that multiplies the friction of the table.
+    """A Gaussian random field that multiplies table friction.
 
     Its value is ``1 + amplitude * sum(cos(wave . p + phase))``, a sum of random
-    Fourier features: with waves drawn from a normal distribution of standard
-    deviation 1 / length, its correlation is a Gaussian of that length.
+    Fourier features. With waves from a normal distribution of standard deviation
+    1 / length, its correlation is a Gaussian of that length.
     """
 
     wave: Float[Array, "*batch feature 2"]  # rad/m
@@ -32,7 +32,7 @@ class FrictionField(eqx.Module):
     def at(
         self, x: Float[Array, "*batch"], y: Float[Array, "*batch"]
     ) -> Float[Array, "*batch"]:
-        """Return the multiplier at a place (m), at least a tenth."""
+        """Return the multiplier at a position (m), at least 0.1."""
         phase = (
             self.wave[..., 0] * x[..., None]
             + self.wave[..., 1] * y[..., None]
@@ -43,7 +43,7 @@ class FrictionField(eqx.Module):
 
 
 class Scene(eqx.Module):
-    """Disks on a table and the cylinder that pushes them: all that is static."""
+    """Static properties of disks on a table and of the pusher."""
 
     mass: Float[Array, "*batch body"]  # kg
     radius: Float[Array, "*batch body"]  # m
@@ -72,11 +72,11 @@ _NOT_NEGATIVE = ("table_friction", "disk_friction", "pusher_friction")
 
 
 def check_scene(scene: Scene, source: str = "scene") -> None:
-    """Raise `BadScene` unless every property is a finite number of the right sign.
+    """Raise `BadScene` unless every property is finite and of the right sign.
 
     Args:
         scene: any batch shape, not traced.
-        source: what to name in the message, a file for instance.
+        source: name for the message, for example a file.
 
     Raises:
         BadScene: with the source, the field, the value and what it must be.

@@ -8,7 +8,7 @@ from sainet.scenes.state import State
 
 
 def pair_gaps(scene: Scene, state: State) -> Float[Array, "*batch body body"]:
-    """Return the gaps between the surfaces of the disks (m); negative: overlap.
+    """Return the gaps between the surfaces of disks (m), negative for overlaps.
 
     The diagonal is infinite.
     """
@@ -21,7 +21,7 @@ def pair_gaps(scene: Scene, state: State) -> Float[Array, "*batch body body"]:
 
 
 def pusher_gaps(scene: Scene, state: State) -> Float[Array, "*batch body"]:
-    """Return the gaps between the pusher and each disk (m); negative: overlap."""
+    """Return the gaps between the pusher and each disk (m), negative for overlaps."""
     offset = state.position - state.pusher_position[..., None, :]
     distance = jnp.sqrt(jnp.sum(offset**2, axis=-1))
     return distance - scene.radius - scene.pusher_radius[..., None]

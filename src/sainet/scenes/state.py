@@ -12,7 +12,7 @@ from sainet.runs.errors import BadScene
 
 
 class State(eqx.Module):
-    """Where the bodies and the pusher are and how they move."""
+    """Poses and velocities of the disks and the pusher, in the table frame."""
 
     position: Float[Array, "*batch body 2"]  # m
     angle: Float[Array, "*batch body"]  # rad, counter-clockwise, never wrapped
@@ -28,10 +28,10 @@ class State(eqx.Module):
 
 
 class Trajectory(eqx.Module):
-    """The states after each step; the initial one is not repeated.
+    """States after each step, without the initial state.
 
-    Every field of `states` has a time axis right after the batch axes. In every
-    engine and model ``p(t+1) = p(t) + dt * v(t+1)``, penetration recovery included.
+    Every field of `states` has a time axis directly after the batch axes. In every
+    engine and model ``p(t+1) = p(t) + dt * v(t+1)``, also during recovery of overlaps.
     """
 
     states: State
@@ -43,7 +43,7 @@ class Trajectory(eqx.Module):
 
     @property
     def is_finite(self) -> Bool[Array, "*batch time"]:
-        """Whether the disks' poses and velocities are numbers, step by step."""
+        """Whether poses and velocities of all disks are finite, for each step."""
         states = self.states
         pose = jnp.isfinite(states.position).all((-1, -2))
         motion = jnp.isfinite(states.velocity).all((-1, -2))
@@ -67,7 +67,7 @@ def at_rest(
     angle: Float[Array, "*batch body"],
     pusher_position: Float[Array, "*batch 2"],
 ) -> State:
-    """Return the state in which nothing moves."""
+    """Return the state at rest with the given poses."""
     return State(
         position=position,
         angle=angle,
@@ -79,9 +79,9 @@ def at_rest(
 
 
 def pack_motion(state: State) -> Float[Array, "*batch body 6"]:
-    """Pack each disk's x, y, angle and their rates into six numbers.
+    """Return x, y, angle and their rates of each disk in one array.
 
-    This one array is what stores and networks work on.
+    Datasets and networks use this array.
     """
     pose = jnp.concatenate([state.position, state.angle[..., None]], axis=-1)
     rate = jnp.concatenate([state.velocity, state.spin[..., None]], axis=-1)
@@ -93,7 +93,7 @@ def unpack_motion(
     pusher_position: Float[Array, "*batch 2"],
     pusher_velocity: Float[Array, "*batch 2"],
 ) -> State:
-    """Undo `pack_motion`."""
+    """Return the state of packed motion; the inverse of `pack_motion`."""
     return State(
         position=motion[..., 0:2],
         angle=motion[..., 2],

@@ -60,7 +60,7 @@ def test_a_killed_process_is_reported_and_replaced():
     many = pushed(GenerateConfig(disks=1, pushes=9), 3, 2)
     before = roll_out(make_engine("bullet"), *many).states
     wait([pool._pool().submit(os._exit, 1)])
-    with pytest.raises(SainetError, match="a worker process was ended"):
+    with pytest.raises(SainetError, match="a worker process was killed"):
         roll_out(make_engine("bullet"), *many)
     assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
 
