@@ -204,7 +204,7 @@ def put(name, value):
         (put("tolerance_mm", float("nan")), "tolerance_mm is 'nan' and not a number"),
         (put("final_mm", True), "final_mm is"),
         (put("moved", 2), "moved is 2 of 2 disks"),
-        (put("trial", 1), "trial is 1, which is another episode"),
+        (put("trial", 1), "trial is 1, another episode"),
     ],
 )
 def test_errors_in_an_episode_file_are_named(tmp_path, done, damage, says):
