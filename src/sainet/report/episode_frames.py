@@ -1,4 +1,4 @@
-"""An episode as frames that play: what the page and the video of it are made of."""
+"""Frames of an episode, for the page and the animation."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -11,21 +11,21 @@ from jaxtyping import Float
 from sainet.report.palette import style_of
 
 FRAMES_PER_SECOND = 30  # records hold every eighth step of 1/240 s
-_FRAMES_OF_PUSH = 12  # 0.4 s: the push itself lasts 0.2 s, and then all rests
-_STRIDE = 3  # of the points of a planned path
+_FRAMES_OF_PUSH = 12  # 0.4 s: the push lasts 0.2 s, then all bodies come to rest
+_STRIDE = 3  # between the drawn points of a planned path
 
 Record = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class EpisodeFrames:
-    """What is seen at each thirtieth of a second, the time to decide left out."""
+    """Frames of an episode, 30 per second, without the decision times."""
 
     record: Record
 
     @cached_property
     def starts(self) -> list[int]:
-        """The frame at which each push begins."""
+        """The frame at which each push starts."""
         lengths = [1 + len(self._shown(turn["actual"])) for turn in self._turns]
         return [0, *np.cumsum(lengths).tolist()][: len(lengths)]
 
@@ -43,11 +43,11 @@ class EpisodeFrames:
 
     @cached_property
     def pusher(self) -> Float[np.ndarray, "frame 2"]:
-        """The centre of the pusher (mm); before the first push it is nowhere."""
+        """The centre of the pusher (mm); NaN before the first push."""
         if not self._turns:
             return np.full((1, 2), np.nan)
         parts = [self._shown(turn["pusher"]) for turn in self._turns]
-        # It stands at the disk, where its push begins, when the disks are observed.
+        # While the disks are observed, the pusher is at the start of its push.
         return np.concatenate([np.asarray([part[0], *part], float) for part in parts])
 
     @property
@@ -61,11 +61,11 @@ class EpisodeFrames:
     @property
     def distances(self) -> list[float]:
         """The distance from the goal before each push, and at the end (mm)."""
-        seen = [turn["distance_mm"] for turn in self._turns]
-        return np.asarray([*seen, self.record["final_mm"]], float).tolist()
+        measured = [turn["distance_mm"] for turn in self._turns]
+        return np.asarray([*measured, self.record["final_mm"]], float).tolist()
 
     def turn_at(self, frame: int) -> int:
-        """Return which push is under way; -1 when there is none."""
+        """Return the index of the current push; -1 before the first."""
         return int(np.searchsorted(self.starts, frame, side="right")) - 1
 
     @property
@@ -78,7 +78,7 @@ class EpisodeFrames:
 
 
 def episode_title(record: Record) -> str:
-    """Return who pushes, and how it ended."""
+    """Return the title of an episode: its model and outcome."""
     model = style_of(record["model"]).label
     return f"{model}, {record['goals']} goal {record['trial'] + 1}: {outcome(record)}"
 
@@ -88,7 +88,7 @@ def outcome(record: Record) -> str:
     pushes = "1 push" if record["pushes"] == 1 else f"{record['pushes']} pushes"
     if record["solved"]:
         return f"solved with {pushes}"
-    # What follows a colon explains the reason: the record keeps it.
+    # Leave out the details after the colon, which the record keeps.
     reason = record["reason"].partition(":")[0]
     return f"{'not at the goal' if reason == 'solved' else reason} after {pushes}"
 
@@ -125,5 +125,5 @@ def _plane(places: np.ndarray) -> dict[str, list[float | None]]:
 
 
 def _numbers(values: Iterable[float]) -> list[float | None]:
-    """Return numbers; what is not finite has no place in JSON: None."""
+    """Return numbers, with None for NaN and infinity, which JSON lacks."""
     return [float(value) if np.isfinite(value) else None for value in values]

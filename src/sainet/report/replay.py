@@ -1,4 +1,4 @@
-"""One push as the truth and the models have it: what a replay and a figure draw."""
+"""One push with its ground truth and predictions, for replays and figures."""
 
 from dataclasses import dataclass
 
@@ -8,14 +8,14 @@ from jaxtyping import Float
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One account of a push, from its initial state on; NaN where not observed."""
+    """The motion of one push from its initial state; NaN where not observed."""
 
     position: Float[np.ndarray, "time body 2"]  # m, time is the steps plus one
     angle: Float[np.ndarray, "time body"]  # rad, counter-clockwise
     pusher: Float[np.ndarray, "time 2"]  # m
 
     def __post_init__(self) -> None:
-        """Check that the three fields tell of the same steps and bodies."""
+        """Check that the three fields have the same steps and bodies."""
         time, body = self.angle.shape
         shapes = self.position.shape, self.pusher.shape
         if shapes != ((time, body, 2), (time, 2)):
@@ -27,7 +27,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """Several accounts of the same push; the first track is the reference."""
+    """Tracks of the same push; the first is the reference."""
 
     title: str
     time_step: float  # s
@@ -36,7 +36,7 @@ class Replay:
     tracks: dict[str, Track]  # by model, the truth first
 
     def __post_init__(self) -> None:
-        """Check that there is a reference and that all tracks are alike."""
+        """Check that there is a reference and that all tracks have one shape."""
         shapes = {track.angle.shape for track in self.tracks.values()}
         if len(shapes) != 1:
             raise ValueError(f"a replay needs tracks of one shape, not {shapes}")
@@ -50,15 +50,15 @@ class Replay:
 
     @property
     def reference(self) -> Track:
-        """The track that the others are compared with."""
+        """The track with which the others are compared."""
         return next(iter(self.tracks.values()))
 
     def errors_mm(self, model: str) -> Float[np.ndarray, "time body"]:
-        """Return how far a model's disks are from the reference (mm)."""
+        """Return the position errors of a model's disks (mm)."""
         offset = self.tracks[model].position - self.reference.position
         return 1e3 * np.linalg.norm(offset, axis=-1)
 
     def final_turn_deg(self, model: str) -> Float[np.ndarray, " body"]:
-        """Return the absolute error of each disk's angle at the end (degrees)."""
+        """Return the absolute final angle error of each disk (degrees)."""
         offset = self.tracks[model].angle[-1] - self.reference.angle[-1]
         return np.degrees(np.abs(np.arctan2(np.sin(offset), np.cos(offset))))

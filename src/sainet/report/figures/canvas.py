@@ -1,4 +1,4 @@
-"""The look that all figures share, and how they are saved."""
+"""The common style of all figures, and their saving."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
@@ -52,17 +52,17 @@ _PIECE = (7, 27)  # points right of the axes: of the line, before its label
 
 
 def house_look() -> AbstractContextManager[None]:
-    """Return a context in which new figures and their saving have the house look."""
+    """Return a context in which new figures have the common style."""
     return matplotlib.rc_context(_LOOK)
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure of that size (inches), laid out without overlaps."""
+    """Return an empty figure of a size (inches), laid out without overlaps."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure in the format of the suffix, whole or not at all."""
+    """Write a figure in the format of its suffix, atomically."""
     suffix = path.suffix.lower()
     with atomic_path(path) as draft:
         figure.savefig(
@@ -72,7 +72,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def line_look(style: ModelStyle, width: float = 1.6) -> dict[str, Any]:
-    """Return the keywords with which matplotlib draws a model's line (points)."""
+    """Return Matplotlib's keywords for the line of a model (points)."""
     dashes = {"dashes": style.dash, "dash_capstyle": "butt"} if style.dash else {}
     return {"color": style.color, "linewidth": width, **dashes}
 
@@ -88,12 +88,12 @@ def label_ends(
     styles: Sequence[ModelStyle],
     ends: Sequence[tuple[float, float]],
 ) -> None:
-    """Write each model's label beside the end of its line, none over another.
+    """Write each model's label next to the end of its line, without overlaps.
 
-    A piece of the line stands before it: lines may end at one place.
+    A piece of the line precedes each label, because lines may share their end.
 
     Args:
-        axes: with its limits and scales as they will be drawn.
+        axes: axes with their final limits and scales.
         styles: of the lines.
         ends: the last point of each line, in the units of the axes; a line that
             ends in NaN gets no label.
@@ -124,9 +124,9 @@ def label_ends(
 
 
 def spread(wanted: Float[np.ndarray, " n"], gap: float) -> Float[np.ndarray, " n"]:
-    """Return places near the wanted ones, in the same order, at least a gap apart.
+    """Return positions near the wanted positions, in order and at least a gap apart.
 
-    Overlapping neighbours become a block that is centred where they wanted to be.
+    Overlapping neighbours become a block centred at their wanted positions.
     """
     order = np.argsort(wanted, kind="stable")
     blocks: list[list[float]] = []  # each: sum of the wanted starts, members

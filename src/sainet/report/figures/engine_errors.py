@@ -1,4 +1,4 @@
-"""Where on the table, and in which direction, an engine is wrong about real pushes."""
+"""Errors of engines on recorded pushes, by position on the table and heading."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
     from sainet.evaluation.offsets import EndOffsets
 
 _CELL = 20.0  # mm, of the table
-_FEWEST = 4  # pushes from which a mean is drawn
-_ARROW = 8.0  # times as long as what it shows
-_SECTORS = 12  # of directions
-_SHOWN = 2.0  # mm, the arrow that explains the scale
+_FEWEST = 4  # pushes of a mean that is drawn
+_ARROW = 8.0  # times its true length
+_SECTORS = 12  # of headings
+_SHOWN = 2.0  # mm, length of the scale arrow
 
 
 def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
-    """Draw what engines miss: a row for each surface and engine.
+    """Draw the final errors of engines, with one row per surface and engine.
 
-    Left: the mean vector from where the engine says that the disk ends to where it
-    ended, by where the disk was before. Right: that vector along the push and to its
-    left, over the direction of the push on the table; bands are two standard errors.
-    An engine of even friction that knows it would leave no arrow and two level lines.
+    Left: the mean vector from the predicted to the recorded final position, by the
+    initial position of the disk. Right: this vector along the push and to its left,
+    over the heading of the push; bands are two standard errors. An engine that models
+    uniform friction correctly would have no arrows and two level lines.
 
     Args:
-        cases: by the name of surface and engine.
+        cases: errors by the name of surface and engine.
         path: where to write; ``.svg`` or ``.png``.
     """
     with house_look():

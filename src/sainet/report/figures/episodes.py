@@ -1,4 +1,4 @@
-"""Episodes of control in the manner of the paper's figure: start, goal and end."""
+"""Control episodes in the style of the paper's figure: start, goal and end."""
 
 import math
 import textwrap
@@ -15,21 +15,21 @@ from sainet.report.figures.canvas import house_look, new_figure, save
 from sainet.report.palette import INK, MOVED, OTHER, PUSHED, TARGET
 
 _ACROSS = 3  # panels
-_TITLE_WIDTH = 26  # characters; a longer title would push its panel out of the figure
-_MARGIN = 10  # mm about everything that is drawn
+_TITLE_WIDTH = 26  # characters; a longer title would leave the figure
+_MARGIN = 10  # mm around the drawing
 
 Record = Mapping[str, Any]
 Place = Sequence[float] | np.ndarray  # mm
 
 
 def draw_episodes(records: Sequence[Record], path: Path) -> Path:
-    """Draw each episode in a panel: disks at the start transparent, at the end solid.
+    """Draw one panel per episode: initial disks transparent, final disks solid.
 
-    The target region is the disk of the tolerance about the goal; the centre of the
-    moved disk at the end is a white cross.
+    The target region is the tolerance around the goal; a white cross marks the final
+    centre of the target disk.
 
     Args:
-        records: as they are kept in the run folder of `sainet control`.
+        records: records from the run folder of `sainet control`.
         path: where to write; ``.svg`` or ``.png``.
     """
     across = min(_ACROSS, len(records))
@@ -37,7 +37,7 @@ def draw_episodes(records: Sequence[Record], path: Path) -> Path:
     with house_look():
         figure = new_figure(0.4 + 2.9 * across, 0.3 + 2.6 * down)
         panels = figure.subplots(down, across, squeeze=False).ravel()
-        # All panels have one scale: an episode is not larger for being shorter.
+        # All panels share one scale, so that episodes can be compared.
         low, high = _extent(records)
         for axes, record in zip(panels, records, strict=False):
             draw_episode(axes, record)
@@ -48,12 +48,12 @@ def draw_episodes(records: Sequence[Record], path: Path) -> Path:
 
 
 def _extent(records: Sequence[Record]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower left and the upper right corner of all that is drawn (mm)."""
+    """Return the lower left and upper right corners of the drawing (mm)."""
     places = [body_paths(record)[..., :2].reshape(-1, 2) for record in records]
     goals = np.array([record["goal_mm"] for record in records])
     every = np.concatenate([*places, goals])
     reach = _MARGIN + max(max(record["radius_mm"]) for record in records)
-    # What diverged has no place.
+    # Diverged poses have no position.
     return np.nanmin(every, axis=0) - reach, np.nanmax(every, axis=0) + reach
 
 
@@ -69,9 +69,9 @@ def draw_episode(axes: Axes, record: Record) -> None:
     _disk(axes, record["goal_mm"], record["tolerance_mm"], facecolor=TARGET, zorder=4)
     end = path[-1, record["moved"], :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
-    said = textwrap.fill(outcome(record), _TITLE_WIDTH)
+    title = textwrap.fill(outcome(record), _TITLE_WIDTH)
     off = record["final_mm"]
-    axes.set_title(said if off is None else f"{said}\n{off:.1f} mm off")
+    axes.set_title(title if off is None else f"{title}\n{off:.1f} mm off")
     axes.set_aspect("equal")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
@@ -79,7 +79,7 @@ def draw_episode(axes: Axes, record: Record) -> None:
 def body_paths(record: Record) -> np.ndarray:
     """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg).
 
-    NaN where they left the finite numbers.
+    Diverged poses are NaN.
     """
     turns = record["turns"]
     if not turns:
@@ -89,7 +89,7 @@ def body_paths(record: Record) -> np.ndarray:
 
 
 def body_color(record: Record, body: int) -> str:
-    """Return the colour of a disk: the pushed one red, the moved one blue."""
+    """Return the colour of a disk: pushed disk red, target disk blue."""
     if body == record["moved"]:
         return MOVED
     return PUSHED if body == 0 else OTHER

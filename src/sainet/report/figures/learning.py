@@ -1,4 +1,4 @@
-"""How the loss fell while a network learned."""
+"""The learning curve of a network."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,8 +22,8 @@ from sainet.report.palette import INK, ModelStyle, styles_of
 
 History = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
-_WINDOW = 0.1  # share of the logged losses that a mean is of
-# How each kind of line looks.
+_WINDOW = 0.1  # fraction of the logged losses in a mean
+# The style of each kind of line.
 _BATCH: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.45}
 _MEAN: dict[str, Any] = {"linewidth": 1.6}
 _VALIDATION: dict[str, Any] = {"linestyle": ":", "marker": "o", "markersize": 3}
@@ -60,7 +60,7 @@ def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
 
 
 def running_mean(losses: Float[np.ndarray, " logged"]) -> Float[np.ndarray, " logged"]:
-    """Return the mean of the losses around each one; a batch's own says little."""
+    """Return the running mean of noisy batch losses."""
     window = max(int(_WINDOW * len(losses)), 1)
     return uniform_filter1d(losses, window, mode="nearest")
 
@@ -81,7 +81,7 @@ def _explain_lines(axes: Axes, histories: Mapping[str, History]) -> None:
 
 
 def _end(history: History) -> tuple[float, float] | None:
-    """Return where the curve of a model ends: validation's, else training's mean."""
+    """Return the end of a model's curve: validation, else mean training loss."""
     iterations, training, checked, validation = map(np.asarray, history)
     if len(validation):
         return float(checked[-1]), float(validation[-1])

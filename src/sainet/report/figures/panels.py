@@ -1,4 +1,4 @@
-"""The panels that show one push: the whole scene, and each centre under a lens."""
+"""Panels of one push: the whole scene, and a magnified path of each disk."""
 
 from collections.abc import Sequence
 
@@ -27,7 +27,7 @@ _LEGEND_DROP = 0.56  # below the axis label
 
 
 def push_panels(lenses: int, models: int) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its panels: the scene, then a lens for each disk."""
+    """Return a figure and its panels: the scene, then one magnified panel per disk."""
     first, slot = 2 * _GAP + _SCENE_WIDTH, _LENS_WIDTH + _GAP
     starts = [first + slot * lens for lens in range(lenses)]
     width = starts[-1] + _LENS_WIDTH + 0.45
@@ -65,13 +65,13 @@ def draw_scene(axes: Axes, replay: Replay, styles: dict[str, ModelStyle]) -> Non
 def draw_lens(
     axes: Axes, replay: Replay, body: int, styles: dict[str, ModelStyle]
 ) -> None:
-    """Draw the paths of one disk's centre (mm from where it truly started)."""
+    """Draw the paths of one disk's centre (mm from its true initial position)."""
     origin = replay.reference.position[0, body]
     paths = {
         name: MM * (track.position[:, body] - origin)
         for name, track in replay.tracks.items()
     }
-    # The truth goes on last: it is what the eye compares the others with.
+    # Draw the ground truth last, on top of the predictions.
     for name in [*list(paths)[1:], *list(paths)[:1]]:
         path = paths[name]
         axes.plot(*path.T, **line_look(styles[name]))
@@ -99,7 +99,7 @@ def _draw_truth(axes: Axes, replay: Replay) -> None:
 
 
 def _draw_mark(axes: Axes, track: Track, body: int, radius: float) -> None:
-    """Write the disk's number, and draw from its rim inwards how it has turned."""
+    """Write the number of the disk, and draw its angle as a mark on the rim."""
     place, angle = MM * track.position[-1, body], track.angle[-1, body]
     ray = MM * radius * np.array([np.cos(angle), np.sin(angle)])
     axes.plot(*np.stack([place + 0.78 * ray, place + ray]).T, color=INK, linewidth=1.2)
@@ -120,7 +120,7 @@ def _circle(axes: Axes, place: Float[np.ndarray, "2"], radius: float, **look) ->
 
 
 def _frame(axes: Axes, points: Float[np.ndarray, "n 2"]) -> None:
-    """Show all points in a square with a margin, both axes to the same scale."""
+    """Set square limits with a margin around all points, with equal scales."""
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     half = 0.5 * 1.16 * max(float((high - low).max()), _SMALLEST_LENS)
     middle = (low + high) / 2

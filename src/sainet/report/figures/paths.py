@@ -1,8 +1,8 @@
-"""The figures: paths of a push, errors over time.
+"""Figures of one push: predicted paths, and errors over time.
 
-Each function draws with matplotlib's objects alone (no window, no global state but
-the style during the call), writes SVG or PNG by the suffix, whole or not at all, and
-returns the path.
+Each function uses only Matplotlib objects (no window, no global state except the
+style during the call), writes SVG or PNG by suffix, atomically, and returns the
+path.
 """
 
 from collections.abc import Mapping
@@ -27,10 +27,10 @@ Curve = Float[np.ndarray, "time body"]  # mm
 
 
 def draw_paths(replay: Replay, path: Path) -> Path:
-    """Draw predicted against true paths of one push.
+    """Draw the predicted and true paths of one push.
 
-    The first panel shows the whole scene; one panel for each disk shows the path of
-    its centre to a millimetre scale, with the final errors of each model.
+    The first panel shows the whole scene. One panel per disk shows the path of its
+    centre on a millimetre scale, with the final errors of each model.
     """
     styles = styles_of(replay.tracks)
     with house_look():
@@ -48,7 +48,7 @@ def draw_error_over_time(
     time_step: float,
     bands: Mapping[str, tuple[Curve, Curve]] | None = None,
 ) -> Path:
-    """Draw how the mean position error grows during a push, a panel for each disk.
+    """Draw the mean position error over the time of a push, one panel per disk.
 
     Args:
         curves: by model, the error after each step (mm).

@@ -1,4 +1,4 @@
-"""An episode as a film: MP4 with the extra `video`, else an animated GIF."""
+"""Animation of an episode: MP4 with the extra `video`, otherwise GIF."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -25,11 +25,11 @@ from sainet.runs.documents import atomic_path
 from sainet.runs.errors import MissingExtra
 
 FORMATS = (".mp4", ".gif")
-_PIXELS = (960, 544)  # both divide by 16, as encoders like it
+_PIXELS = (960, 544)  # multiples of 16, as encoders require
 _DOTS_PER_INCH = 100
-_HOLD = 20  # frames that the end is shown for
+_HOLD = 20  # frames that show the end
 _GIF_STRIDE = 2  # a GIF shows every second frame
-_FADE = 0.45  # of a plan that a newer one has replaced
+_FADE = 0.45  # opacity of replaced plans
 _PLANS = 4
 _MARK = 0.75  # of the radius, from where the mark goes to the rim
 
@@ -37,7 +37,7 @@ Frame = UInt8[np.ndarray, "height width 3"]
 
 
 def best_format() -> str:
-    """Return the suffix of the best film that can be written here."""
+    """Return the suffix of the best format that is available."""
     try:
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
@@ -46,22 +46,22 @@ def best_format() -> str:
 
 
 def frame_count(record: Record) -> int:
-    """Return how many pictures the film of an episode has."""
+    """Return the number of frames in the animation of an episode."""
     return len(EpisodeFrames(record).poses) + _HOLD
 
 
 def write_film(
     record: Record, path: Path, *, on_frame: Callable[[], None] = lambda: None
 ) -> Path:
-    """Write the film of an episode, whole or not at all.
+    """Write the animation of an episode atomically and return its path.
 
     Args:
-        record: of the episode, as the run folder of `sainet control` keeps it.
+        record: record of the episode, from the run folder of `sainet control`.
         path: ends in .mp4 or .gif.
-        on_frame: told of each of the `frame_count` pictures when it is drawn.
+        on_frame: called after each of the `frame_count` frames.
 
     Raises:
-        MissingExtra: an MP4 is wanted and `imageio-ffmpeg` is not installed.
+        MissingExtra: the format is MP4 and `imageio-ffmpeg` is not installed.
     """
     frames = _telling(draw_frames(record), on_frame)
     with atomic_path(path) as draft:
@@ -79,7 +79,7 @@ def _telling(frames: Iterator[Frame], on_frame: Callable[[], None]) -> Iterator[
 
 
 def draw_frames(record: Record) -> Iterator[Frame]:
-    """Yield the pictures of a film, thirty a second."""
+    """Yield the frames of an animation, 30 per second."""
     with house_look():
         stage = _Stage(record)
         last = len(stage.frames.poses) - 1
@@ -88,7 +88,7 @@ def draw_frames(record: Record) -> Iterator[Frame]:
 
 
 class _Stage:
-    """A figure whose disks, plans and curve are moved from frame to frame."""
+    """Figure whose disks, plans and curve change from frame to frame."""
 
     def __init__(self, record: Record) -> None:
         self.record, self.frames = record, EpisodeFrames(record)
@@ -104,12 +104,13 @@ class _Stage:
         figure.set_layout_engine("none")  # it need not be laid out for each frame
 
     def picture(self, frame: int) -> Frame:
-        """Return the picture of one frame."""
+        """Return the pixels of one frame."""
         self._move_disks(frame)
         self._show_plans(self.frames.turn_at(frame))
         is_last = frame == len(self.frames.poses) - 1
-        seen = len(self.frames.distances) if is_last else self.frames.turn_at(frame) + 1
-        self._curve.set_data(range(seen), self.frames.distances[:seen])
+        last = len(self.frames.distances)
+        count = last if is_last else self.frames.turn_at(frame) + 1
+        self._curve.set_data(range(count), self.frames.distances[:count])
         self._canvas.draw()
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
@@ -204,9 +205,9 @@ def _write_mp4(frames: Iterator[Frame], path: Path) -> None:
     except ImportError:
         raise MissingExtra(
             'MP4 needs the package imageio-ffmpeg: pip install "sainet[video]"; '
-            "without it films are written as .gif."
+            "without it animations are written as .gif."
         ) from None
-    # The draft has no suffix that FFmpeg knows.
+    # FFmpeg does not support the suffix of the temporary file.
     writer = write_frames(
         str(path), _PIXELS, fps=FRAMES_PER_SECOND, output_params=["-f", "mp4"]
     )

@@ -1,4 +1,4 @@
-"""The report: one HTML file that needs nothing else, not even a network."""
+"""The report: one self-contained HTML file."""
 
 import base64
 import re
@@ -27,7 +27,7 @@ _DECIMALS_RAD = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What a report tells. Every string but a figure's SVG is escaped."""
+    """Contents of a report. Every string except the SVG of figures is escaped."""
 
     title: str
     subtitle: str = ""
@@ -43,13 +43,13 @@ class Report:
 
 
 def write_report(report: Report, path: Path) -> Path:
-    """Write the report, whole or not at all, and return its path."""
+    """Write the report atomically and return its path."""
     write_bytes(path, to_page(report).encode())
     return path
 
 
 def to_page(report: Report) -> str:
-    """Return the report as one HTML page without a single outside reference."""
+    """Return the report as one HTML page without external references."""
     return render(
         "report.html.j2",
         report=report,
@@ -109,7 +109,7 @@ def _plane(position: np.ndarray) -> dict[str, list[float | None]]:
 
 
 def _numbers(values: np.ndarray, decimals: int) -> list[float | None]:
-    """Return rounded numbers; what is not finite has no place in JSON: None."""
+    """Return rounded numbers, with None for NaN and infinity, which JSON lacks."""
     rounded = np.round(np.asarray(values, float), decimals)
     return [value if np.isfinite(value) else None for value in rounded.tolist()]
 

@@ -1,4 +1,4 @@
-"""Figures as parts of a page: checked, named apart, in the colours of its theme."""
+"""Figures as parts of a page: checked, with unique names and theme colours."""
 
 import re
 from pathlib import Path
@@ -10,13 +10,13 @@ from sainet.report.palette import css_variables
 from sainet.runs.errors import BadInput
 
 _PIXELS_PER_POINT = 1.4
-# What a figure of this package is made of.
+# Elements and attributes of figures drawn by this package.
 _SHAPES = ("svg", "defs", "style", "g", "path", "use", "text", "clipPath", "rect")
 _ATTRIBUTES = {
     *("id", "style", "type", "version", "viewBox", "width", "height", "x", "y", "d"),
     *("transform", "clip-path", "href"),
 }
-# In CSS: what is loaded from elsewhere, and escapes, with which it could be hidden.
+# CSS that loads external content, and escapes that could hide it.
 _REFERS_OUTSIDE = re.compile(r"url\(\s*(?!#)|@|\\", re.IGNORECASE)
 _NAMESPACES = {
     "": "http://www.w3.org/2000/svg",
@@ -25,13 +25,13 @@ _NAMESPACES = {
 
 
 def read_svg(path: Path) -> str:
-    """Read a figure that this package drew.
+    """Return a checked figure that this package drew.
 
-    What is returned is written anew from what was checked: comments and declarations,
-    in which more could hide, are gone.
+    The result is rebuilt from its checked parts, without comments and declarations,
+    which could hide other content.
 
     Raises:
-        BadInput: it is none: it might do something in the page.
+        BadInput: the file contains anything else, which might act in the page.
     """
     try:
         figure = ElementTree.fromstring(path.read_text("utf-8"))
@@ -45,8 +45,8 @@ def read_svg(path: Path) -> str:
         plain = all(map(_is_plain, part.attrib.items()))
         if name not in _SHAPES or not plain or _REFERS_OUTSIDE.search(rules):
             raise BadInput(
-                f"{path}: <{name}> is nothing that sainet draws; delete the file or "
-                "take it out of the folder."
+                f"{path}: <{name}> does not occur in figures of sainet; delete or move "
+                "the file."
             )
     for prefix, name in _NAMESPACES.items():
         ElementTree.register_namespace(prefix, name)
@@ -54,7 +54,7 @@ def read_svg(path: Path) -> str:
 
 
 def _is_plain(attribute: tuple[str, str]) -> bool:
-    """Whether an attribute does nothing and refers to nothing outside."""
+    """Return whether an attribute has no action and no external reference."""
     name, value = attribute[0].rpartition("}")[2], attribute[1]
     if name not in _ATTRIBUTES or (name == "href" and not value.startswith("#")):
         return False
@@ -62,10 +62,10 @@ def _is_plain(attribute: tuple[str, str]) -> bool:
 
 
 def inline_svg(text: str, number: int) -> Markup:
-    """Return an SVG fit to stand inside a page.
+    """Return an SVG as part of a page.
 
-    Its identifiers get a prefix, so that two figures do not mix them up, and the
-    colours of the palette become variables, which follow the theme of the page.
+    Identifiers get a prefix, so that they are unique among figures. The colours of
+    the palette become variables, which follow the theme of the page.
     """
     svg = text[text.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
@@ -79,6 +79,6 @@ def inline_svg(text: str, number: int) -> Markup:
 
 
 def _at_reading_size(opening: re.Match[str]) -> str:
-    """Limit the width, so that the text of all figures has the same size."""
+    """Return the figure with a limited width, so that all text has one size."""
     width = float(opening[2]) * _PIXELS_PER_POINT
     return f'<svg style="max-width: {width:.0f}px"{opening[1]} width="{opening[2]}pt"'
