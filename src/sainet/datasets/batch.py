@@ -1,4 +1,4 @@
-"""A batch of stored pushes as the types that engines and models work on."""
+"""Batches of stored pushes, in the types of engines and models."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
 
 class PushBatch(eqx.Module):
-    """Pushes of one length: what was commanded, what happened, what was predicted."""
+    """Pushes of one length: controls, observed motion and simulator prediction."""
 
     scene: Scene
     initial: State
@@ -34,7 +34,7 @@ class PushBatch(eqx.Module):
 
     @property
     def is_observed(self) -> Bool[Array, " push"]:
-        """Whether anything is known of how each push went."""
+        """Whether any step of each push was observed."""
         return jnp.any(self.pose_observed | self.rate_observed, axis=-1)
 
 
@@ -45,13 +45,13 @@ def to_batch(
     steps: int | None = None,
     simulated: str | None = None,
 ) -> PushBatch:
-    """Turn stored arrays into a batch.
+    """Return a batch of stored arrays.
 
     Args:
-        arrays: of some pushes, by variable name.
-        info: of the store they come from.
-        steps: how many steps to keep; None keeps all.
-        simulated: the assumed engine whose prediction to take along.
+        arrays: arrays of some pushes, by variable name.
+        info: attributes of their store.
+        steps: number of steps to keep; None for all.
+        simulated: internal engine whose prediction to include.
     """
     time = slice(steps)
     truth = arrays["truth"][:, time]
@@ -71,7 +71,7 @@ def to_batch(
 
 
 def to_scene(arrays: dict[str, np.ndarray], info: StoreInfo) -> Scene:
-    """Return the scenes of stored pushes; the field of friction is not known."""
+    """Return the scenes of stored pushes, without varying table friction."""
     names = ("mass", "radius", "table_friction", "disk_friction", "pusher_friction")
     known: dict[str, Any] = {
         name: jnp.asarray(arrays[name]) for name in (*names, "pusher_radius")
@@ -80,7 +80,7 @@ def to_scene(arrays: dict[str, np.ndarray], info: StoreInfo) -> Scene:
 
 
 def to_initial(arrays: dict[str, np.ndarray]) -> State:
-    """Return the states before stored pushes; the pusher is at rest."""
+    """Return the initial states of stored pushes, with the pusher at rest."""
     pusher = jnp.asarray(arrays["initial_pusher"])
     return unpack_motion(jnp.asarray(arrays["initial"]), pusher, jnp.zeros_like(pusher))
 
@@ -113,19 +113,19 @@ def check_finite(
     motion: Float[np.ndarray, "push time body 6"],
     names: Sequence[str],
 ) -> None:
-    """Check that an engine stayed within the numbers.
+    """Raise `Diverged` if an engine produced NaN or infinity.
 
     Args:
         engine: its name.
         motion: packed, of each push.
-        names: what the user knows each push by.
+        names: name of each push for the message.
 
     Raises:
-        Diverged: it left them; the message names the first push in which it did.
+        Diverged: the message names the first such push.
     """
     finite = np.isfinite(motion).all((1, 2, 3))
     if not finite.all():
         raise Diverged(
-            f"{names[int(np.argmin(finite))]}: the engine {engine} left the numbers; "
+            f"{names[int(np.argmin(finite))]}: engine {engine} gave NaN or infinity; "
             "check its masses, radii, frictions and path."
         )

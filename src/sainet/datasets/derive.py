@@ -1,4 +1,4 @@
-"""Datasets made from others: pushes picked, or what is known of them changed."""
+"""Datasets derived from others: selected or modified pushes."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,20 +17,20 @@ def derive(
     settings: dict[str, Any],
     change: Callable[[Arrays], Arrays],
 ) -> Store:
-    """Write what a function makes of a whole dataset, once.
+    """Return a dataset that a function makes of another dataset; written once.
 
     Args:
         store: read whole into memory.
         out: the run folder.
-        settings: what the function does, as JSON values: they and the content of the
-            store decide whether a folder holds the same already.
-        change: returns the same arrays, changed, of fewer pushes or of more disks.
+        settings: settings of the function, as JSON values: with the content of the
+            store, they identify the derived dataset.
+        change: returns the changed arrays, with fewer pushes or more disks.
 
     Raises:
-        RunConflict: the folder holds something else.
+        RunConflict: the folder belongs to another run.
     """
-    told = {"command": "derive", "data": store.content, **settings}
-    folder = open_run(out, told, finished_by=HASHES)
+    known = {"command": "derive", "data": store.content, **settings}
+    folder = open_run(out, known, finished_by=HASHES)
     if not folder.is_finished:
         arrays = change(store.read(slice(None)))
         pushes, bodies = arrays["mass"].shape

@@ -1,4 +1,4 @@
-"""Simulated datasets, chunk by chunk, by as many workers as there are."""
+"""Simulated datasets, made chunk by chunk by any number of workers."""
 
 import logging
 from collections.abc import Callable
@@ -36,23 +36,23 @@ def generate(
     executor: Executor | None = None,
     on_pushes: Callable[[int], None] = lambda pushes: None,
 ) -> Store:
-    """Make a dataset of simulated pushes, or go on with an interrupted one.
+    """Return a dataset of simulated pushes; an interrupted one resumes.
 
-    However it is interrupted, and whatever the number of workers, the same settings
-    end in the same bytes.
+    Equal settings give byte-identical datasets, whatever the interruptions and the
+    number of workers.
 
     Args:
         config: what to simulate.
         out: the run folder.
-        executor: computes the chunks; None computes them here, one by one.
-        on_pushes: told how many pushes were finished each time some were.
+        executor: computes the chunks; None computes them in this process, one by one.
+        on_pushes: called with the number of newly finished pushes.
 
     Raises:
-        RunConflict: the folder holds something else.
+        RunConflict: the folder belongs to another run.
         BadInput: the disk is full, a scene has no room for its disks, or an engine
             cannot have as many.
         MissingExtra: an engine needs a package that is not installed.
-        Diverged: an engine left the numbers.
+        Diverged: an engine produced NaN or infinity.
     """
     _check_possible(config)
     folder = open_run(
@@ -85,7 +85,7 @@ def _check_possible(config: GenerateConfig) -> None:
 
 
 def make_chunk(config: GenerateConfig, out: Path, index: int) -> int:
-    """Simulate and write one chunk; what a worker does. Returns the index."""
+    """Simulate and write one chunk (the job of a worker) and return its index."""
     write_chunk(out, store_info(config), index, simulate_chunk(config, index))
     return index
 

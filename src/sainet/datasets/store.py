@@ -1,4 +1,4 @@
-"""Reading a store: checked when it is opened, then read in parts."""
+"""Stores of pushes: checked when they are opened, then read in parts."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
@@ -22,34 +22,34 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Store:
-    """A whole and unharmed dataset of pushes."""
+    """A complete, undamaged dataset of pushes."""
 
     path: Path
     info: StoreInfo
     rows: tuple[int, ...] | None = None  # of the pushes that are chosen; None: all
 
     def first(self, pushes: int) -> "Store":
-        """Return the store cut to its first pushes.
+        """Return the store with only its first pushes.
 
         Raises:
-            BadInput: it has not as many.
+            BadInput: the store has fewer pushes.
         """
         if not 1 <= pushes <= self.info.pushes:
             raise BadInput(f"{self.path} has {self.info.pushes} pushes, not {pushes}.")
         return self if pushes == self.info.pushes else self.take(range(pushes))
 
     def take(self, rows: Iterable[int] | np.ndarray) -> "Store":
-        """Return the store with some of its pushes alone, in that order.
+        """Return the store with only some of its pushes, in the given order.
 
-        All of them in their order are the store as it is, its content too.
+        All pushes in their order give the same store with the same content hash.
 
         Raises:
-            BadInput: there are none, or one is not there.
+            BadInput: no push is chosen, or the store does not contain one of them.
         """
         every = range(self.info.pushes) if self.rows is None else self.rows
         rows = [int(row) for row in rows]
         if not rows:
-            raise BadInput(f"{self.path}: no push is left to work on.")
+            raise BadInput(f"{self.path}: no push was chosen; choose at least one.")
         if not 0 <= min(rows) <= max(rows) < self.info.pushes:
             raise BadInput(
                 f"{self.path} has {self.info.pushes} pushes; there is no push "
@@ -65,7 +65,7 @@ class Store:
         """Return the pushes of one group.
 
         Raises:
-            BadInput: there is no such group.
+            BadInput: the store has no such group.
         """
         if name not in self.info.groups:
             known = ", ".join(self.info.groups) or "none"
@@ -74,9 +74,9 @@ class Store:
         return self.take(np.flatnonzero(groups == self.info.groups.index(name)))
 
     def repeats(self) -> Int[np.ndarray, " push"]:
-        """Return a number for each push; those that were meant to be alike share it.
+        """Return a number for each push; repeats of one push share their number.
 
-        Where nobody said which are, no two do.
+        In stores without this information, no two pushes are repeats.
         """
         if not self.info.has_repeats:
             return np.arange(self.info.pushes)
@@ -131,11 +131,11 @@ class Store:
 
 
 def open_store(path: Path | str, *, verify: bool = True) -> Store:
-    """Open a dataset and check that nothing of it is missing or changed.
+    """Return a dataset after checking that nothing is missing or changed.
 
     Args:
-        path: the folder that `sainet generate` or `sainet import` made.
-        verify: compare every file with its hash.
+        path: folder made by `sainet generate` or `sainet import`.
+        verify: whether to compare every file with its hash.
 
     Raises:
         BadStore: it is missing, unfinished, damaged or of a newer format.
@@ -152,8 +152,8 @@ def _open(folder: Path, *, verify: bool) -> Store:
         )
     if not (folder / HASHES).is_file():
         raise BadStore(
-            f"{folder / HASHES}: missing, so the dataset is unfinished or none; "
-            "run the command that made it again and it goes on."
+            f"{folder / HASHES}: not found, so the dataset is not finished; run the "
+            "command that made it again to resume."
         )
     listing = read_json(folder / HASHES, BadStore)
     _check_version(folder, folder / HASHES, listing)

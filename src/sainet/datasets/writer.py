@@ -1,4 +1,4 @@
-"""Writing a store chunk by chunk; a list of hashes, written last, makes it whole."""
+"""Writing of stores, chunk by chunk; a list of hashes, written last, completes them."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ PROGRESS = "progress"
 
 
 def create_arrays(folder: Path, info: StoreInfo) -> None:
-    """Create the empty arrays of a store; again is harmless, the bytes are the same.
+    """Create the empty arrays of a store; repeated calls give the same bytes.
 
     Raises:
         BadInput: the disk is full.
@@ -50,12 +50,12 @@ def create_arrays(folder: Path, info: StoreInfo) -> None:
 
 
 def write_chunk(folder: Path, info: StoreInfo, index: int, arrays: dict) -> None:
-    """Write one chunk of every array, then the receipt that says so.
+    """Write one chunk of every array, then its receipt.
 
     Args:
-        folder: of the run.
+        folder: run folder.
         info: of the store.
-        index: of the chunk.
+        index: index of the chunk.
         arrays: NumPy arrays by variable name, shape ``[pushes of the chunk, ...]``.
 
     Raises:
@@ -87,10 +87,10 @@ def chunk_files(info: StoreInfo, index: int) -> list[str]:
 
 
 def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
-    """Return the chunks that still have to be written.
+    """Return the chunks that are not written yet.
 
-    A chunk counts as written when its receipt is there and its files are what the
-    receipt says. What an interrupted writer left half-done is removed.
+    A chunk is complete if its receipt exists and its files match the receipt.
+    Remains of an interrupted writer are removed.
     """
     for leftover in (folder / ARRAYS).rglob("*.partial"):
         leftover.unlink(missing_ok=True)
@@ -116,7 +116,7 @@ def _receipt(folder: Path, index: int) -> Path:
 
 
 def finish(folder: Path, info: StoreInfo) -> None:
-    """Write the list of all hashes, which says that the store is whole."""
+    """Write the list of all hashes, which marks the store as complete."""
     hashes: dict[str, str] = {}
     for index in range(info.chunks):
         hashes |= read_json(_receipt(folder, index))
@@ -128,12 +128,12 @@ def finish(folder: Path, info: StoreInfo) -> None:
 
 
 def clear_progress(folder: Path) -> None:
-    """Remove the receipts of a finished store; again is harmless."""
+    """Remove the receipts of a finished store, if there are any."""
     shutil.rmtree(folder / PROGRESS, ignore_errors=True)
 
 
 def write_store(folder: Path, info: StoreInfo, arrays: dict) -> None:
-    """Write a store that is already whole in memory."""
+    """Write a store whose arrays are in memory."""
     create_arrays(folder, info)
     for index in range(info.chunks):
         part = {k: v[info.chunk_slice(index)] for k, v in arrays.items()}
@@ -156,7 +156,7 @@ def write_once(
         make_chunk: returns the arrays of one chunk.
 
     Raises:
-        RunConflict: the folder holds something else, or another process works there.
+        RunConflict: the folder belongs to another run, or another process uses it.
         BadInput: the disk is full.
     """
     if open_run(out, settings, finished_by=HASHES).is_finished:

@@ -1,4 +1,4 @@
-"""Identified parameters on disk: what `sainet identify` found, as a document."""
+"""Identified parameters on disk, as written by `sainet identify`."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -51,17 +51,17 @@ class Identified(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def is_identified(folder: Path) -> bool:
-    """Return whether `sainet identify` made a folder, finished or not."""
+    """Return whether a folder is from `sainet identify`, finished or not."""
     try:
         if (folder / FILE).is_file():
             return True
         return read_json(folder / CONFIG).get("command") == "identify"
-    except (BadInput, OSError):  # missing or damaged: the reader of it will say so
+    except (BadInput, OSError):  # missing or damaged: reading it raises the error
         return False
 
 
 def read_identified(folder: Path) -> Identified:
-    """Read the parameters that `sainet identify` estimated.
+    """Return the parameters that `sainet identify` estimated.
 
     Raises:
         BadInput: the file is missing, damaged or out of bounds.

@@ -1,4 +1,4 @@
-"""Documents on disk: JSON, hashes, and writes that are whole or not at all."""
+"""Documents on disk: JSON, hashes and atomic writes."""
 
 import errno
 import hashlib
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 def to_json(value: object) -> str:
-    """Return JSON text: sorted keys, so that the same value is the same bytes."""
+    """Return JSON text with sorted keys, so that equal values give equal bytes."""
     return json.dumps(value, indent=2, sort_keys=True, allow_nan=False) + "\n"
 
 
@@ -35,9 +35,9 @@ def content_hash(data: bytes) -> str:
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """Give a temporary path that takes the place of `path` if all went well.
+    """Yield a temporary path that replaces `path` on success.
 
-    Whoever reads `path` sees the old file or the new one, never a part of it.
+    Readers of `path` get the old file or the new file, never a part.
 
     Raises:
         BadInput: the disk is full or the folder cannot be written.
@@ -55,7 +55,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 def write_error(path: Path, error: OSError) -> BadInput:
-    """Say what stopped a write, in one line."""
+    """Return the error for a failed write, in one line."""
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return BadInput(
             f"{path}: the disk is full; make room, then run the same command again."
@@ -76,10 +76,10 @@ def write_json(path: Path, value: object) -> None:
 
 @contextmanager
 def readable(path: Path, error: type[BadInput] = BadInput) -> Iterator[None]:
-    """Say in one line why a path that is looked at cannot be.
+    """Raise an error in one line if a path cannot be inspected.
 
     Raises:
-        BadInput: or the given subclass; the name is too long, say.
+        BadInput: or the given subclass, for example for a name that is too long.
     """
     try:
         yield
@@ -90,10 +90,10 @@ def readable(path: Path, error: type[BadInput] = BadInput) -> Iterator[None]:
 
 
 def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
-    """Read a JSON object.
+    """Return the JSON object in a file.
 
     Raises:
-        BadInput: or the given subclass, when it is missing or no JSON object.
+        BadInput: or the given subclass, if the file is missing or not a JSON object.
     """
     try:
         value = json.loads(path.read_text("utf-8"))
@@ -108,7 +108,7 @@ def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
 
 
 def is_number(value: object) -> bool:
-    """Return whether a value that was read from JSON is a finite number."""
+    """Return whether a value from JSON is a finite number."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     try:
@@ -120,7 +120,7 @@ def is_number(value: object) -> bool:
 def read_file(
     path: Path, *, most: int = LARGEST_DOCUMENT, error: type[BadInput] = BadInput
 ) -> bytes:
-    """Read a regular file up to a stated size; devices and pipes are refused.
+    """Return the bytes of a regular file; devices, pipes and large files are refused.
 
     Args:
         path: of the file.
@@ -153,7 +153,7 @@ def read_file(
 def read_document(
     path: Path, kind: type[T], *, error: type[BadInput] = BadInput, remedy: str = ""
 ) -> T:
-    """Read a JSON document into a msgspec struct; every field is checked.
+    """Return a JSON document as a msgspec struct, with every field checked.
 
     Args:
         path: of the file.
@@ -173,6 +173,6 @@ def read_document(
 
 
 def write_document(path: Path, document: msgspec.Struct) -> None:
-    """Write a struct as JSON: sorted keys, so that equal documents are equal bytes."""
+    """Write a struct as JSON with sorted keys: equal documents are equal bytes."""
     # By way of builtins: msgspec would write NaN as null.
     write_json(path, msgspec.to_builtins(document, order="sorted"))

@@ -1,7 +1,7 @@
-"""How far the planar engine is from Bullet, and Bullet from itself in a turned scene.
+"""Differences of the planar engine from Bullet, and of Bullet in a rotated scene.
 
-Truth is Bullet without noise; every other engine knows the true properties. Bullet is
-not isotropic: no engine can be closer to it than it is to itself.
+The ground truth is Bullet without noise; all engines have the true properties. Bullet
+is not isotropic: its difference from itself is the best possible result.
 """
 
 from typing import Any
@@ -26,13 +26,13 @@ from sainet.studies.config import Scale
 
 PUSHES = 200
 _SETUPS: tuple[Setup, ...] = ("robot", "direct-force")
-# Of a uniform pressure: what its spin feels alone, and what it feels while it slides
+# Of a uniform pressure: the ratio for pure rotation, and for rotation while sliding
 # (the root of <r^2> / 2), where the ellipsoid of the planar engine resists too much.
 _RATIOS = (2 / 3, 0.5)
 
 
 class TurnedEngine(AbstractEngine):
-    """An engine that sees the scene turned, and whose answer is turned back."""
+    """Wrapper that rotates the scene, and rotates the motion back."""
 
     engine: AbstractEngine
     angle: float  # rad
@@ -43,7 +43,7 @@ class TurnedEngine(AbstractEngine):
         return self.engine.on_host
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
-        """Roll the wrapped engine out in the turned scene."""
+        """Return the rollout of the wrapped engine in the rotated scene."""
         turned = turn_state(initial, self.angle)
         controls = turn_controls(controls, self.angle)
         states = self.engine.rollout(scene, turned, controls).states
@@ -51,7 +51,7 @@ class TurnedEngine(AbstractEngine):
 
 
 def turn_state(state: State, angle: float) -> State:
-    """Turn a state about the table's origin (rad)."""
+    """Return a state rotated about the origin of the table (rad)."""
     return State(
         position=rotate(state.position, jnp.asarray(angle)),
         angle=state.angle + angle,
@@ -63,7 +63,7 @@ def turn_state(state: State, angle: float) -> State:
 
 
 def turn_controls(controls: Controls, angle: float) -> Controls:
-    """Turn controls about the table's origin (rad)."""
+    """Return controls rotated about the origin of the table (rad)."""
     turn = jnp.asarray(angle)
     if isinstance(controls, PathControls):
         path = rotate(controls.position, turn), rotate(controls.velocity, turn)
@@ -73,8 +73,8 @@ def turn_controls(controls: Controls, angle: float) -> Controls:
 
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
-    """Compare the engines on 200 random pushes of each setup; returns the table."""
-    del scale  # the same at any
+    """Return a table that compares the engines on 200 random pushes of each setup."""
+    del scale  # both scales are equal
     table: dict[str, Any] = {"rows": [], "comparisons": []}
     for setup in _SETUPS:
         config = GenerateConfig(

@@ -1,4 +1,4 @@
-"""What becomes of the models outside of what they were told and trained for."""
+"""Robustness to wrong properties and unseen conditions."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -17,13 +17,13 @@ from sainet.studies.paper_tables import SEEDS
 PERCENT_WRONG = (2, 5, 10)
 SPEEDS_MM_S = (25.0, 100.0)
 GAP_MM = 2.0
-# Angles from which those outside of 60 (contact) and 30 degrees (direction) are kept.
+# Pushes beyond 60 (contact) and 30 degrees (direction) are selected from these.
 CONTACT_DEG, DIRECTION_DEG = 75.0, 45.0
 _SEED = 11
 
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
-    """Compare the networks of Table III on pushes that differ; returns the table."""
+    """Return a table of the networks of Table III on unseen conditions."""
     setup = paper_setup("robot", scale, chain)
     trainings = setup.train(NETWORKS, SEEDS[scale])
     table = join(
@@ -49,7 +49,7 @@ def _test_sets(setup: PaperSetup) -> Iterator[tuple[str, Store]]:
 
 
 def _misread(setup: PaperSetup, usual: Store, percent: int) -> Store:
-    """Return the test pushes with each mass and radius too large or too small."""
+    """Return the test pushes with every mass and radius too large or too small."""
 
     def change(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         rng = np.random.default_rng(_SEED)
@@ -65,7 +65,7 @@ def _misread(setup: PaperSetup, usual: Store, percent: int) -> Store:
 
 
 def _outside_angles(setup: PaperSetup) -> Store:
-    """Return those of wider pushes that no training had."""
+    """Return pushes outside the training range, from a wider distribution."""
     wide = setup.test_pushes(
         "test-wide-angles", contact_angle_deg=CONTACT_DEG, direction_deg=DIRECTION_DEG
     )
@@ -81,7 +81,7 @@ def _outside_angles(setup: PaperSetup) -> Store:
 
 
 def push_angles(arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the size of contact angle and direction of stored pushes (rad)."""
+    """Return absolute contact angles and push directions of stored pushes (rad)."""
     place = arrays["initial"][:, :, :2]
     normal = place[:, 0] - arrays["initial_pusher"]
     way = arrays["command_position"][:, -1] - arrays["initial_pusher"]

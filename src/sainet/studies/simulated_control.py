@@ -1,8 +1,8 @@
-"""The paper's control table, in simulation: who pushes disk 2 to its goal.
+"""The paper's control table in simulation: success of each model on equal goals.
 
-The world is Bullet with noise, its disks are not those that the engine inside the model
-believes in, and every model sees the same goals, tables and noise. Networks are those
-that ship.
+The world is Bullet with noise. Its disks differ from the assumed properties of the
+internal engine, and all models face the same goals, tables and noise. Networks are the
+shipped ones.
 """
 
 from collections.abc import Iterator
@@ -25,19 +25,19 @@ PLANNERS = ("greedy", "tree")
 
 @dataclass(frozen=True)
 class Group:
-    """Trials that every model goes through, and what they are called."""
+    """A named condition of trials, run with every model."""
 
     name: str
     config: ControlConfig
 
 
 def run(scale: Scale, chain: Chain) -> dict[str, Any]:
-    """Run every model through every group of trials; returns the table.
+    """Return the table of all models and conditions.
 
     Args:
-        scale: `paper` is 100 easy and 100 hard goals for each model and planner, and 50
-            goals each with nominal properties alone and with a chain of three disks.
-        chain: does the steps; finished episodes in its folder are not run again.
+        scale: `paper` has 100 easy and 100 hard goals for each model and planner, and
+            50 goals each with assumed properties and with a row of three disks.
+        chain: runs the steps; finished episodes in its folder are kept.
     """
     rows, pairs = [], []
     for group in groups(TRIALS[scale]):
@@ -58,7 +58,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
 
 
 def groups(trials: int) -> Iterator[Group]:
-    """Yield the trials of the paper, then those beyond it."""
+    """Yield the conditions of the paper, then further ones."""
     usual = ControlConfig(world="bullet", trials=trials)
     for planner in PLANNERS:
         for goals in GOALS:

@@ -1,4 +1,4 @@
-"""Noise of the simulated world: of the truth alone, never of a prediction.
+"""Noise of the simulated world, which acts on ground truth, never on predictions.
 
 Drawn with NumPy from explicit generators, one batch of pushes at a time.
 """
@@ -19,16 +19,16 @@ def ornstein_uhlenbeck(
     correlation_time: float,
     time_step: float,
 ) -> Float[np.ndarray, "push time axis"]:
-    """Draw a mean-reverting random walk that starts at zero.
+    """Return an Ornstein-Uhlenbeck process that starts at zero.
 
     Args:
-        rng: where the randomness comes from.
+        rng: random generator.
         shape: pushes, steps and axes; axes are independent.
         deviation: stationary standard deviation, in the unit of the result.
         correlation_time: s.
         time_step: s.
     """
-    # Here: it takes half a second, which planning and --help need not wait for.
+    # Imported here: the import takes half a second, which other commands can skip.
     from scipy.signal import lfilter
 
     keep = np.exp(-time_step / correlation_time)
@@ -42,7 +42,7 @@ def tracking_error(
     noise: NoiseConfig,
     time_step: float,
 ) -> Float[np.ndarray, "push time 2"]:
-    """Draw the pusher's error about its path (m); while it holds, it stays put."""
+    """Return tracking errors of the pusher (m), constant while the pusher holds."""
     error = ornstein_uhlenbeck(
         rng,
         (*moving.shape, 2),
@@ -62,7 +62,7 @@ def force_error(
     noise: NoiseConfig,
     time_step: float,
 ) -> Float[np.ndarray, "push time 2"]:
-    """Draw the error of the force on the pusher (N)."""
+    """Return errors of the force on the pusher (N)."""
     error = ornstein_uhlenbeck(
         rng,
         force.shape,
@@ -76,7 +76,7 @@ def force_error(
 def friction_features(
     rng: np.random.Generator, pushes: int, noise: NoiseConfig
 ) -> dict[str, np.ndarray]:
-    """Draw the fields of `sainet.scenes.scene.FrictionField` for a batch of tables."""
+    """Return random fields of `scenes.scene.FrictionField` for a batch of tables."""
     length = noise.friction_length_mm / 1000
     shape = (pushes, FRICTION_FEATURES)
     amplitude = noise.friction_fraction * np.sqrt(2 / FRICTION_FEATURES)
@@ -90,6 +90,6 @@ def friction_features(
 def capture_error(
     rng: np.random.Generator, shape: tuple[int, int, int], noise: NoiseConfig
 ) -> Float[np.ndarray, "push time body 3"]:
-    """Draw the error of motion capture: of x and y (m) and of the angle (rad)."""
+    """Return motion-capture errors of x and y (m) and of the angle (rad)."""
     size = [noise.capture_mm / 1000] * 2 + [np.deg2rad(noise.capture_deg)]
     return rng.standard_normal((*shape, 3)) * np.array(size)
