@@ -47,7 +47,7 @@ class Chromium(NamedTuple):
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Starts the slow tests first, so that no worker ends the run alone with one."""
+    """Start the slow tests first, so that no worker finishes long after the others."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is None)
 
 

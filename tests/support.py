@@ -14,7 +14,7 @@ typechecker = beartype(conf=BeartypeConf(is_pep484_tower=True))
 
 
 def require(condition: object, reason: str) -> None:
-    """Skips the test with the reason where the machine lacks what it needs.
+    """Skip the test, with the reason, if the machine lacks a requirement.
 
     With SAINET_REQUIRE_ALL=1 it fails instead, so that a run which installed everything
     cannot pass by testing nothing.

@@ -1,4 +1,4 @@
-"""Every example runs, says something, and stays short."""
+"""Every example runs, prints something and is short."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What README.md and docs/ tell people to type has to exist."""
+"""Commands and make targets in README.md and docs/ exist."""
 
 import json
 import re

@@ -34,7 +34,7 @@ def run(*command: object, **settings: object) -> subprocess.CompletedProcess[str
 
 
 def run_well(*command: object, **settings: object) -> str:
-    """Like `run`, and what it printed; anything but exit status 0 fails the test."""
+    """Output of a command; any exit status except 0 fails the test."""
     done = run(*command, **settings)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

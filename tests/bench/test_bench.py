@@ -1,4 +1,4 @@
-"""The benchmarks count the work they say, measure it and compare like with like."""
+"""Benchmarks count the stated work, measure it and compare equal work."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What `sainet control` says at the end, with episodes that cost nothing."""
+"""The final output of `sainet control`, with fake episodes."""
 
 import shlex
 
@@ -12,7 +12,7 @@ from sainet.control.config import ControlConfig
 
 @pytest.fixture
 def said(monkeypatch, tmp_path, capsys):
-    """What is said of so many episodes that end alike."""
+    """The output for a number of equal episodes."""
 
     def run(trials, **ends):
         records = [record(trial=trial, **ends) for trial in range(trials)]

@@ -60,7 +60,7 @@ every_case = pytest.mark.parametrize(("setup", "bodies"), CASES)
 
 
 class Case(NamedTuple):
-    """Pushes with the paper's distributions, and how an engine says they go."""
+    """Pushes with the paper's distributions, and their motion in an engine."""
 
     scene: Scene
     initial: State

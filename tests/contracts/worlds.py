@@ -48,7 +48,7 @@ class Tolerance:
 
 TOLERANCES = {
     # Its solver is iterative, its friction cone is not quite round, contact points lie
-    # at any height of a disk's side, and a rollout that goes on has lost its contacts.
+    # at any height of a disk's side, and a continued rollout has lost its contacts.
     "bullet": Tolerance(
         pressure_ratio=2 / 3,
         stopping=0.05,

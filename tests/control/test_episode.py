@@ -107,7 +107,7 @@ def test_a_robot_in_trouble_ends_the_episode():
 
 
 class Contrary(Rail):
-    """Pushes along another way than it was asked to, and says so."""
+    """A robot that executes and reports another push than the planned push."""
 
     def push(self, push):
         other = eqx.tree_at(lambda p: p.direction, push, push.direction + 0.3)

@@ -52,7 +52,7 @@ def test_an_episode_file_is_complete(done):
         assert np.shape(turn["planned"])[1:] == (2, 3)
         assert abs(turn["contact_angle_deg"]) <= 60
         assert turn["looked_at"] >= 72
-        # Toward the goal, and not far from where the plan said.
+        # Toward the goal, and near the planned pose.
         gap = np.subtract(turn["actual"][-1], turn["planned"][9])[:, :2]
         assert np.abs(gap).max() < 8
     assert records[0]["goal_mm"] != records[1]["goal_mm"]
@@ -241,7 +241,7 @@ def test_the_stopping_tolerance_may_be_below_the_tolerance(tmp_path, monkeypatch
         (judged,) = run_trials(config, tmp_path / str(aim))
         assert judged["tolerance_mm"] == pytest.approx(5.9)
         assert aimed[-1].tolerance == pytest.approx(aim * 0.1)
-    # Trials from before there was this setting go on.
+    # Trials from before this setting resume.
     told = [read_json(tmp_path / name / CONFIG_FILE) for name in ("1.0", "0.8")]
     assert [one["aim"] for one in told] == [1.0, 0.8]
 

@@ -1,4 +1,4 @@
-"""A disk that nothing touches: what an engine says of the same scene is the oracle."""
+"""Bystanders, compared with an engine on the same scene."""
 
 import json
 from dataclasses import replace

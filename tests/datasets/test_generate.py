@@ -164,7 +164,7 @@ def test_disks_without_room_leave_nothing_behind(tmp_path):
 
 
 def test_no_room_in_a_later_chunk_is_found_before_any_work(tmp_path):
-    """Of these eight chunks the sixth alone cannot be drawn."""
+    """Eight chunks, of which only the sixth cannot be drawn."""
     config = GenerateConfig(disks=3, placement_deg=32.3, pushes=40, chunk_size=5)
     with pytest.raises(BadInput, match="no room"):
         generate(config, tmp_path / "out")

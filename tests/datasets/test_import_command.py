@@ -1,4 +1,4 @@
-"""`sainet import` as a user types it, and physics evaluated on what it made."""
+"""`sainet import` as a command, and physics evaluated on imported pushes."""
 
 import json
 from pathlib import Path

@@ -261,7 +261,7 @@ def flipped(path: Path) -> None:
 
 
 def lying(path: Path) -> None:
-    """The directory says that the file is smaller than it is."""
+    """An archive whose directory states too small a size for a file."""
     pack(path, good())
     data = bytearray(path.read_bytes())
     at = data.rindex(b"PK\1\2") + 24

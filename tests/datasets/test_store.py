@@ -1,4 +1,4 @@
-"""A store reads back what was written, and says what is wrong with it."""
+"""Stores read back what was written, and errors name what is wrong."""
 
 import json
 import os
@@ -72,7 +72,7 @@ def test_a_truncated_chunk_is_named(copy):
     os.truncate(copy / CHUNK, 100)
     message = refusal(copy)
     assert f"{CHUNK}: truncated or changed" in message
-    # A finished folder is left alone, so that the same command alone does nothing.
+    # A finished folder stays unchanged, so the same command does nothing.
     assert f"delete {copy}, then run the command that made it again" in message
 
 

@@ -59,7 +59,7 @@ class Touch:
         return float((other - one) @ axis)
 
     def _mass(self, axis: np.ndarray) -> float:
-        """How heavy both bodies are, seen from the contact."""
+        """Effective mass of both bodies at the contact (kg)."""
         total = 0.0
         for body, side in ((self.first, 1), (self.second, -1)):
             if np.isinf(body.mass):

@@ -1,4 +1,4 @@
-"""An engine that believes in the paper's properties whatever the scene is."""
+"""Engines with the paper's assumed properties, whatever the scene."""
 
 import equinox as eqx
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Identification finds what the engine was given, and says what it cannot find."""
+"""Identification recovers true parameters and reports unidentifiable ones."""
 
 import json
 from dataclasses import replace
@@ -49,7 +49,7 @@ STROKES = GenerateConfig(
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory):
-    """Ends of strokes in a world with the true values; the store believes in others."""
+    """Final poses of long pushes with the true values; the store assumes others."""
     folder = tmp_path_factory.mktemp("identify")
     made = generate(STROKES, folder / "made")
     arrays, info = made.read(slice(None)), made.info
@@ -296,7 +296,7 @@ def test_unobserved_and_force_driven_pushes_are_refused(tmp_path):
 
 
 def test_pushes_of_all_lengths_have_equal_weight(tmp_path, caplog):
-    """Of the short ones the end alone was seen, of the long ones every step."""
+    """Short pushes have only observed final poses, long pushes all steps."""
     info = info_of(8, bodies=1)
     arrays = made_up(info, lengths=[8] * 4 + [12] * 4)
     arrays["pose_observed"][:4, :7] = False

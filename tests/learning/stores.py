@@ -41,7 +41,7 @@ def info_of(pushes: int, **changes) -> StoreInfo:
 
 
 def made_up(info: StoreInfo, lengths=None, seed: int = 0) -> dict[str, np.ndarray]:
-    """Arrays of smooth random pushes; the mass of disk 1 tells which push it is."""
+    """Arrays of smooth random pushes; the mass of disk 1 identifies the push."""
     rng = np.random.default_rng(seed)
     size, bodies, steps = info.pushes, info.bodies, info.steps
     lengths = np.full(size, steps) if lengths is None else np.asarray(lengths)
@@ -94,7 +94,7 @@ def single(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def end_points_alone(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """What remains of pushes of which the last pose alone was seen."""
+    """Pushes with only the last pose observed."""
     push, last = np.arange(len(arrays["steps"])), arrays["steps"] - 1
     truth = np.full_like(arrays["truth"], np.nan)
     truth[push, last, :, :3] = arrays["truth"][push, last, :, :3]

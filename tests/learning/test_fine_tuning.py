@@ -1,4 +1,4 @@
-"""Going on from a trained network: on few pushes, known at their ends alone."""
+"""Fine-tuning a trained network on few pushes with only observed final poses."""
 
 from dataclasses import replace
 
@@ -209,7 +209,7 @@ def test_repeats_stay_together_in_validation(tmp_path):
 
 
 def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
-    """Its prediction is computed: the store has none, and the card says it all."""
+    """Its prediction is computed, because the store has none; the card is complete."""
     values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5, "camera_x_mm": 1.5}
     internal = identified_folder(tmp_path / "engine", **values)
     words = {"assumed_engine": str(tmp_path / "engine")}

@@ -1,4 +1,4 @@
-"""Holding what a residual network says: the same predictions, asked less often."""
+"""Zero-order hold of additive networks: equal predictions with fewer evaluations."""
 
 from dataclasses import replace
 from functools import partial
@@ -37,14 +37,14 @@ def predicted(of, batch, hold):
 
 @pytest.fixture
 def residual():
-    """A network that says little and slowly changing things, as trained ones do."""
+    """A network with small, slowly changing outputs, like trained networks."""
     made = network("sain", "robot", residual=True)
     last = lambda n: n.dyn.weights[-1]  # noqa: E731
     return eqx.tree_at(last, made, 0.1 * last(made))
 
 
 def constant(of):
-    """A network that says the same at every step: the bias of its last layer."""
+    """A network with a constant output: the bias of its last layer."""
     last = lambda n: (n.dyn.weights[-1], n.dyn.biases[-1])  # noqa: E731
     weight, bias = last(of)
     said = (jnp.zeros_like(weight), jnp.array([0.5, -0.2, 1.0], bias.dtype))

@@ -15,7 +15,7 @@ from support import SOURCE
 
 ITERATIONS, STOP = 60, 27  # the last checkpoint before it is that of iteration 20
 
-# One device, whatever the machine; says where it is and, if told to, waits for its end.
+# One device on any machine; reports its position and waits for its end on request.
 CHILD = f"""
 import sys, time
 from pathlib import Path
@@ -50,7 +50,7 @@ def train(store, out, *, stop=0):
 
 
 def iterations(process) -> list[int]:
-    """Waits for the end of a training and returns what it reported."""
+    """Wait for the end of a training run and return its report."""
     with process:
         found = [int(line) for line in process.stdout]
     assert process.returncode == 0

@@ -41,7 +41,7 @@ def store(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def quiet(store):
-    """Pushes whose truth is what the planar engine says of them, exactly."""
+    """Pushes whose truth is exactly the prediction of the planar engine."""
     return to_batch(store.read(slice(0, 6)), store.info)
 
 
@@ -83,7 +83,7 @@ def test_restarting_a_memoryless_engine_changes_nothing():
 
 @pytest.mark.parametrize("name", ["in", "sain"])
 def test_training_predicts_a_step_as_the_restarted_model_does(quiet, name):
-    # Every step from the true state before it: both forms must say the same.
+    # Every step from the previous true state: both forms must agree.
     net, inside = network(name, "robot"), engine("planar")
     steps = to_single_steps(quiet, inside if name == "sain" else None)
     found = predict_batch(net, steps)[0]

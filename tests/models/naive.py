@@ -15,7 +15,7 @@ BOUND = 4.0  # standard deviations, that a feature is bent to
 
 @dataclass
 class LocalPush:
-    """One push, seen from the frame of its contact normal."""
+    """One push in the frame of its contact normal."""
 
     mass: np.ndarray
     radius: np.ndarray
@@ -48,7 +48,7 @@ def nearest_disk(scene, state, push: int) -> int:
 
 
 def local_push(scene, state, controls, push: int) -> LocalPush:
-    """What the network is told of one push of a batch."""
+    """Inputs of the network for one push of a batch."""
     pushed = nearest_disk(scene, state, push)
     origin = double(state.position[push, pushed])
     normal = origin - double(state.pusher_position[push])
@@ -126,7 +126,7 @@ def acting_on(local, motion, i: int) -> list[int]:
 
 
 def pair_inputs(local, motion, rate_step, i: int, j: int) -> np.ndarray:
-    """What f_rel sees of the pair (eq. 4; with the simulator eq. 9)."""
+    """Inputs of f_rel for a pair (eq. 4; with the simulator eq. 9)."""
     return np.concatenate(
         [
             motion[i, 3:6],
@@ -139,7 +139,7 @@ def pair_inputs(local, motion, rate_step, i: int, j: int) -> np.ndarray:
 
 
 def body_inputs(local, motion, pose_step, step: int, i: int) -> np.ndarray:
-    """What f_dyn sees of a body but the effects (eq. 5; with the simulator eq. 10)."""
+    """Inputs of f_dyn except the effects (eq. 5; with the simulator eq. 10)."""
     action = local.action[step]
     if local.pusher is not None:
         offset = local.pusher[step] - motion[i, :2]

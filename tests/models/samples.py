@@ -120,7 +120,7 @@ def assumed(order: list[int]) -> AssumedProperties:
 
 
 def dynamics(model: str, kind: str, order: list[int]) -> AbstractDynamics:
-    """A model by name; what it assumes of the disks follows their order."""
+    """A model by name; its assumed properties follow the order of the disks."""
     if model == "physics":
         return PhysicsDynamics(assumed(order))
     if model == "in":

@@ -1,4 +1,4 @@
-"""Models that know that the camera sees things elsewhere than the robot has them."""
+"""Models with a camera offset."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -36,7 +36,7 @@ def test_predictions_equal_those_in_robot_coordinates(name, setup):
     model = model_of(name, setup)
     scene, initial, controls = world(setup)
     plain = predict(model, scene, initial, controls)
-    # What the camera tells of it: the disks elsewhere, the pusher where it was.
+    # In camera coordinates the disks move; the pusher stays.
     offset = jnp.array(OFFSET.vector)
     told = eqx.tree_at(
         lambda s: s.position, initial, initial.position + offset[None, None]

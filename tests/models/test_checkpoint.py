@@ -1,4 +1,4 @@
-"""Networks on disk: what was written is what is read, or one line says why not."""
+"""Networks on disk: round trips, and one-line errors for damaged files."""
 
 import json
 

@@ -40,7 +40,7 @@ def test_a_network_keeps_its_engine_unless_it_is_forced(folder):
     forced = load_model(str(folder), engine="planar", force=True).dynamics
     assert isinstance(forced, SimulatorAugmented)
     assert isinstance(forced.engine.engine, PlanarEngine)
-    # It assumes what it was trained with.
+    # It has the assumed properties of its training.
     assert forced.engine.assumptions.table_friction == 0.2
 
 

@@ -35,7 +35,7 @@ def touching(gap=0.0):
 
 
 def goal_ahead(distance, angle=0.0, **settings) -> PushToGoal:
-    """A goal at an angle (rad) from the axis of the disks, as seen from disk 2."""
+    """A goal at an angle (rad) from the axis of the disks, relative to disk 2."""
     place = np.asarray(touching().position[1])
     way = np.array([np.cos(0.5 + angle), np.sin(0.5 + angle)])
     return PushToGoal(single(place + distance * way), **settings)

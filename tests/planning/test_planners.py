@@ -85,7 +85,7 @@ def test_the_tree_equals_a_naive_search(angle):
     assert indices(plan) == best_of(task, 2)
     assert plan.looked_at == 6 + 36
     assert plan.is_complete
-    # The path is that of the pushes, to where the search says they end.
+    # The path is that of the pushes, up to the end that the search predicts.
     end = single(plan.path[-1, :, :2])
     assert plan.path.shape == (160, 2, 3)
     assert float(jnp.linalg.norm(end[1] - task.goal)) == pytest.approx(

@@ -1,4 +1,4 @@
-"""The sentences of docs/results.md say what the table says, and not its opposite."""
+"""Sentences of docs/results.md agree with their table."""
 
 import runpy
 

@@ -1,4 +1,4 @@
-"""The report is one file, refers to nothing outside, and escapes what it is told."""
+"""The report is one self-contained file with escaped text."""
 
 import json
 import re

@@ -64,7 +64,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def still(chromium, folder):
-    """The report as someone sees it who wants no motion."""
+    """The report for readers who prefer reduced motion."""
     with opened(chromium, folder, "--force-prefers-reduced-motion") as driver:
         yield driver
 

@@ -1,4 +1,4 @@
-"""The experiments with Bullet, tiny: their rows, what they share and leave alone."""
+"""Tiny studies with Bullet: their rows and their shared datasets and networks."""
 
 from importlib.util import find_spec
 

@@ -1,4 +1,4 @@
-"""Robots that stand in for a real one: what is off, and what is known of it."""
+"""Surrogate robots: their injected errors and their observations."""
 
 import numpy as np
 import pytest
@@ -69,7 +69,7 @@ def test_unexplained_errors_have_the_stated_size():
 
 
 def whole_strokes(angles):
-    """The same with everything that a store knows of them."""
+    """The same pushes with all arrays of a store."""
     arrays = strokes(angles)
     arrays["measured"] = arrays["truth"][..., :3]
     arrays["truth_pusher"] = arrays["command_position"]
@@ -82,7 +82,7 @@ def whole_strokes(angles):
 def test_pushes_are_moved_as_a_whole():
     arrays = whole_strokes(np.array([-1.0, 0.3, 0.8]))
     there = placed(arrays, 0)
-    # What one sees from the pusher, whichever way one looks, stays as it was.
+    # Relative to the pusher, in any direction, nothing changes.
     for name in ("initial", "truth", "measured"):
         own, other = (
             np.linalg.norm(
@@ -157,14 +157,14 @@ def test_only_final_poses_of_recordings_are_observed(chain):
     last = tests["pose_observed"][np.arange(20), tests["steps"] - 1]
     assert last.tolist() == [1] * 20
     assert set(tests["pusher_friction"].tolist()) == {0.25}
-    # No parameter says by how much the truth is off, and nobody is told.
+    # No parameter explains the deviation of the truth.
     went = open_store(chain.out / "tests-simulated")
     went = placed(went.read(slice(None)), went.info.seed)
     table, rest = of_the_table(went), unexplained(went, 0)
     for seen, wanted in ((told, table), (tests, table + rest)):
         off = (seen["truth"] - went["truth"])[:, -1, 0, :3]
         assert off == pytest.approx(wanted, abs=1e-6)
-    # One in twenty of those that are trained on fails, where it is seen alone.
+    # One in twenty training pushes fails, only in its measured pose.
     made = stores["wrong", "training"]
     missed = np.linalg.norm(
         (made["measured"] - made["truth"][..., :3])[..., :2], axis=-1

@@ -43,7 +43,7 @@ class Gone(Executor):
 
 
 class Bars:
-    """Remembers what bars were told."""
+    """A progress bar that records its calls."""
 
     def __init__(self):
         self.told = {}
@@ -91,7 +91,7 @@ def test_parallel_training_gives_the_same_networks(store, tmp_path):
             assert [line["iteration"] for line in two] == [5, 10, 15, 20]
             losses = [[line["loss"] for line in lines] for lines in (one, two)]
             np.testing.assert_allclose(*losses, rtol=1e-3)
-    # What is finished, or alone, needs no process: these have none.
+    # Finished and single training runs need no process.
     again, bars = chain_of(at_once.out, Broken())
     assert again.train_seeds(both(store, again.out), SEEDS) == names
     assert list(bars.told.values()) == [[20, 20]] * 4

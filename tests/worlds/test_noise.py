@@ -1,4 +1,4 @@
-"""The noise of the simulated world has the sizes and correlations that it says."""
+"""Noise of the simulated world has the stated sizes and correlations."""
 
 from dataclasses import replace
 
