@@ -58,7 +58,8 @@ def test_the_content_hash_depends_on_the_taken_pushes(store):
 
 
 @pytest.mark.parametrize(
-    ("rows", "says"), [([], "no push was chosen"), ([0, 12], "no push 12"), ([-1], "-1")]
+    ("rows", "says"),
+    [([], "no push was chosen"), ([0, 12], "no push 12"), ([-1], "-1")],
 )
 def test_only_stored_pushes_can_be_taken(store, rows, says):
     with pytest.raises(BadInput, match=says):
