@@ -143,7 +143,7 @@ def asks_kind_of_controls(tree: ast.AST) -> int:
     )
 
 
-def tests_part_of_a_name(tree: ast.AST) -> int:
+def name_part_tests(tree: ast.AST) -> int:
     """Tests of the beginning or end of something called a model, a name or a slug."""
     return sum(
         isinstance(call.func, ast.Attribute)
@@ -189,7 +189,7 @@ COUNTS = {
         0,
     ),
     "tests of parts of model names": (
-        lambda: sum(map(tests_part_of_a_name, MODELLING)),
+        lambda: sum(map(name_part_tests, MODELLING)),
         4,
         0,
     ),
@@ -225,7 +225,7 @@ def f(controls, name, error):
 '''
     )
     assert asks_kind_of_controls(tree) == 1
-    assert tests_part_of_a_name(tree) == 1
+    assert name_part_tests(tree) == 1
     assert flags_in_strings(tree) == 1
     assert has_untyped_dict(tree)
 
