@@ -27,7 +27,7 @@ from receipts import RECEIPTS, keep, restore
 from sainet.control.record import read_record
 from sainet.control.trials import episode_file
 from sainet.identification.parameters import CAMERA
-from sainet.learning.config import RESIDUAL_TUNING, FitConfig
+from sainet.learning.recipes import PAPER, RESIDUAL
 from sainet.models.library import OF_STROKES
 from sainet.report.control_table import control_markdown
 from sainet.report.figures.video import write_film
@@ -147,7 +147,7 @@ def _tuning() -> str:
     usual = ", ".join(
         "l2 1 / pushes"
         if name == "l2"
-        else f"{_told(name)} {getattr(RESIDUAL_TUNING, name)}"
+        else f"{_told(name)} {RESIDUAL.settings()[name]}"
         for name in named
     )
     return (
@@ -291,12 +291,12 @@ def _regularisation() -> str:
 
 
 def _choice(choices: list[dict[str, float]]) -> str:
-    usual = next(c for c in choices if c["l2"] == FitConfig.l2)
+    usual = next(c for c in choices if c["l2"] == PAPER.objective.l2)
     least = min(choice["score"] for choice in choices)
     above = usual["score"] / least - 1
     if above == 0:
         return "It is the default."
-    said = f"The default, {FitConfig.l2:g}, is {above:.1%} above it"
+    said = f"The default, {PAPER.objective.l2:g}, is {above:.1%} above it"
     if above >= _LEVEL:
         return f"{said}."
     return f"{said} and stays: with one training each, that is no difference to act on."

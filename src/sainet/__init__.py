@@ -14,7 +14,6 @@ _HOMES = {
     "AbstractEngine": "sainet.engines.base",
     "AssumedProperties": "sainet.engines.assumed",
     "ControlConfig": "sainet.control.config",
-    "FitConfig": "sainet.learning.config",
     "ForceControls": "sainet.scenes.controls",
     "GenerateConfig": "sainet.datasets.config",
     "InteractionNetwork": "sainet.models.correctors.interaction",
@@ -24,6 +23,7 @@ _HOMES = {
     "PlanarEngine": "sainet.engines.planar.engine",
     "Push": "sainet.scenes.pushes",
     "PushGrid": "sainet.scenes.pushes",
+    "Recipe": "sainet.learning.recipes",
     "Scene": "sainet.scenes.scene",
     "State": "sainet.scenes.state",
     "Trajectory": "sainet.scenes.state",
@@ -37,6 +37,7 @@ _HOMES = {
     "make_planner": "sainet.planning",
     "open_store": "sainet.datasets.store",
     "predict": "sainet.models.dynamics",
+    "recipe_for": "sainet.learning.recipes",
     "run_episode": "sainet.control.episode",
     "run_trials": "sainet.control.trials",
 }
@@ -54,8 +55,8 @@ if TYPE_CHECKING:
     from sainet.engines.planar.engine import PlanarEngine
     from sainet.evaluation.evaluate import evaluate
     from sainet.identification.identify import identify
-    from sainet.learning.config import FitConfig
     from sainet.learning.fit import fit
+    from sainet.learning.recipes import Recipe, recipe_for
     from sainet.models.correctors.interaction import InteractionNetwork
     from sainet.models.dynamics import AbstractDynamics, predict
     from sainet.models.identity import ModelId
@@ -72,7 +73,6 @@ __all__ = [
     "AbstractEngine",
     "AssumedProperties",
     "ControlConfig",
-    "FitConfig",
     "ForceControls",
     "GenerateConfig",
     "InteractionNetwork",
@@ -82,6 +82,7 @@ __all__ = [
     "PlanarEngine",
     "Push",
     "PushGrid",
+    "Recipe",
     "Scene",
     "State",
     "Trajectory",
@@ -95,6 +96,7 @@ __all__ = [
     "make_planner",
     "open_store",
     "predict",
+    "recipe_for",
     "run_episode",
     "run_trials",
 ]

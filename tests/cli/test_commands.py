@@ -196,19 +196,21 @@ def shown(*words):
     return " ".join(sainet(*words, "--help").stdout.replace("│", " ").split())
 
 
-def test_fine_tuning_has_its_own_defaults():
-    usual, tuned = shown("train", "in"), shown("train", "in", "--start-from", "in")
-    assert "Number of gradient steps. (default: 10000)" in usual
-    assert "Number of gradient steps. (default: 300)" in tuned
-    assert "(default: error)" in tuned
-    assert shown("train", "in", "--start-from=in") == tuned
-    added = shown("train", "sain", "--start_from", "engine")
-    assert "Number of gradient steps. (default: 1200)" in added
+def test_train_and_tune_show_the_settings_of_their_recipes():
+    assert "Gradient steps. (default: 10000)" in shown("train", "in")
+    assert "1,200 from the engine, 300 from a network" in shown("tune", "in")
+
+
+def test_training_from_a_network_names_the_command_for_it(tmp_path):
+    words = ("train", "in", "--start-from", "in", "--data", tmp_path, "--out", "x")
+    error = sainet(*words, status=2).stderr
+    assert "--start-from is in" in error
+    assert "use 'sainet tune in --start in'" in error
 
 
 def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
     few = ("--iterations", 2, "--batch-size", 4, "--steps", 5, "--quiet", "--json")
-    words = ("train", "in", "--start-from", "in", "--data", pushes)
+    words = ("tune", "in", "--start", "in", "--data", pushes)
     done = sainet(*words, "--out", tmp_path / "tuned", *few)
     assert json.loads(done.stdout.splitlines()[-1])["model"] == "in"
     card = json.loads((tmp_path / "tuned/card.json").read_text())

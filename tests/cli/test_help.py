@@ -11,6 +11,8 @@ COMMANDS = [
     "demo",
     "generate",
     "add-bystander",
+    "train",
+    "tune",
     "evaluate",
     "identify",
     "control",

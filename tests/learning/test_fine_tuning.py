@@ -1,7 +1,5 @@
 """Fine-tuning a trained network on few pushes with only observed final poses."""
 
-from dataclasses import replace
-
 import jax
 import numpy as np
 import pytest
@@ -12,11 +10,17 @@ from sainet.datasets.batch import to_batch, to_controls, to_initial
 from sainet.learning import fit as fit_module
 from sainet.learning.batch import path_to_frame, predict_batch
 from sainet.learning.best import Best
-from sainet.learning.config import FINE_TUNING, FitConfig
 from sainet.learning.fit import fit
+from sainet.learning.recipes import (
+    FINE_TUNING,
+    PAPER,
+    Fresh,
+    FromModel,
+    FromSimulator,
+)
 from sainet.learning.statistics import loss_weights
 from sainet.learning.step import trained_layers
-from sainet.learning.task import Start, Task, begin
+from sainet.learning.task import Existing, Task, begin
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import predict
@@ -28,9 +32,9 @@ from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.scenes.state import pack_motion
 
 PLANAR = find_internal_engine("planar")
-BEFORE = FitConfig(iterations=3, batch_size=4, steps=12, log_every=1)
-TUNING = replace(
-    FINE_TUNING,
+BEFORE = PAPER.changed(iterations=3, batch_size=4, steps=12, log_every=1)
+TUNING = FINE_TUNING.changed(
+    start=Fresh(),
     iterations=8,
     batch_size=4,
     validation_share=0.2,
@@ -56,13 +60,17 @@ def start(tmp_path_factory):
     return folder
 
 
+def starting(recipe, network):
+    return recipe.changed(start=FromModel(str(network)))
+
+
 def layers(folder):
     return jax.tree.leaves(load_network(folder)[0])
 
 
 def test_fine_tuning_starts_from_the_network_and_records_it(store, start, tmp_path):
     out = tmp_path / "out"
-    fit("sain", store, TUNING, out, start_from=str(start / "sain"))
+    fit("sain", store, starting(TUNING, start / "sain"), out)
     card, before = read_card(out), read_card(start / "sain")
     assert card.started_from == before.weights
     assert (before.data_seeds, card.data_seeds) == ((0,), (0,))
@@ -83,42 +91,45 @@ def test_fine_tuning_starts_from_the_network_and_records_it(store, start, tmp_pa
 
 
 def load(folder):
-    return Start(*load_network(folder), folder)
+    return Existing(*load_network(folder), folder)
 
 
 def test_a_network_learns_from_table_features(store, start, tmp_path):
     out = tmp_path / "out"
-    seeing = replace(TUNING, features="place", validation_share=0.0)
-    fit("in", store, seeing, out, start_from=str(start / "in"))
+    seeing = TUNING.changed(features="place", validation_share=0.0)
+    fit("in", store, starting(seeing, start / "in"), out)
     network, card = load_network(out)
     assert card.identity.features == "place"
     assert network.features.has_place
     known = load_network(start / "in")[0].features.body_size
     assert np.abs(network.dyn.weights[0][known : known + 6]).max() > 0
     with pytest.raises(BadCheckpoint, match="give `features` place, too"):
-        fit("in", store, TUNING, tmp_path / "no", start_from=str(out))
+        fit("in", store, starting(TUNING, out), tmp_path / "no")
 
 
 def test_l2_pulls_additive_networks_to_their_initial_weights(store, tmp_path):
-    drawn = replace(TUNING, validation_share=0.0, average=0, l2=1e6)
-    fit("sain", store, drawn, tmp_path / "out", start_from="engine")
-    task = Task("sain", store, drawn, PLANAR, from_engine=True)
+    drawn = TUNING.changed(
+        start=FromSimulator(), validation_share=0.0, average=0, l2=1e6
+    )
+    fit("sain", store, drawn, tmp_path / "out")
+    task = Task("sain", store, drawn, PLANAR)
     first = trained_layers(begin(task)[0].network)
     found = trained_layers(load_network(tmp_path / "out")[0])
     # Drawn to zero, each weight would have gone the learning rate at every iteration.
-    far = drawn.iterations * drawn.learning_rate
+    far = drawn.optimiser.iterations * drawn.optimiser.learning_rate
     for one, other in zip(jax.tree.leaves(found), jax.tree.leaves(first), strict=True):
         assert np.abs(one - other).max() < far / 2
 
 
 def test_a_fine_tuned_additive_network_stays_additive(store, tmp_path):
     first, on = tmp_path / "first", tmp_path / "on"
-    fit("sain", store, TUNING, first, start_from="engine")
+    residual = TUNING.changed(start=FromSimulator())
+    fit("sain", store, residual, first)
     network, card = load_network(first)
     assert network.integrator == RelaxingResidual()
     assert (card.residual, card.started_from) == (True, None)
     assert np.abs(network.dyn.weights[-1]).max() > 0  # it has learned something
-    task = Task("sain", store, TUNING, PLANAR, from_engine=True)
+    task = Task("sain", store, residual, PLANAR)
     silent = begin(task)[0].network
     batch = task.to_batch(store.read(slice(None)), store.info.steps)
     frame = push_frame(batch.scene, batch.initial)
@@ -127,14 +138,14 @@ def test_a_fine_tuned_additive_network_stays_additive(store, tmp_path):
         path_to_frame(batch.simulated, frame)[..., 3:],
         atol=1e-5,
     )
-    seeing = replace(TUNING, features="place")
-    fit("sain", store, seeing, on, start_from=str(first))
+    seeing = TUNING.changed(features="place")
+    fit("sain", store, starting(seeing, first), on)
     assert load_network(on)[0].integrator == RelaxingResidual()
     assert read_card(on).started_from == card.weights
-    with pytest.raises(RunConflict, match="start_from"):
+    with pytest.raises(RunConflict, match="start is"):
         fit("sain", store, TUNING, first)
-    with pytest.raises(BadInput, match="train sain, not in"):
-        fit("in", store, TUNING, tmp_path / "no", start_from="engine")
+    with pytest.raises(BadInput, match="train sain, or give"):
+        fit("in", store, TUNING.changed(start=FromSimulator()), tmp_path / "no")
     assert not (tmp_path / "no").exists()
 
 
@@ -152,8 +163,13 @@ def test_the_best_network_on_the_validation_pushes_is_kept(
         return validate
 
     monkeypatch.setattr(fit_module, "_make_validation", validation)
-    patient = replace(TUNING, patience=4)
-    result = fit("in", store, patient, tmp_path / "out", start_from=str(start / "in"))
+    patient = TUNING.changed(patience=4)
+    result = fit(
+        "in",
+        store,
+        starting(patient, start / "in"),
+        tmp_path / "out",
+    )
     # The first figure is of the start, the third, of iteration 2, is the best.
     assert [line["iteration"] for line in result.history] == [1, 2, 3, 4, 5, 6]
     for found, wanted in zip(
@@ -167,17 +183,17 @@ class Stopped(Exception):
 
 
 def test_an_interrupted_tuning_gives_the_same_network(store, start, tmp_path):
-    patient = replace(TUNING, patience=6)
-    words = {"start_from": str(start / "sain")}
-    fit("sain", store, patient, tmp_path / "whole", **words)
+    patient = TUNING.changed(patience=6)
+    patient = starting(patient, start / "sain")
+    fit("sain", store, patient, tmp_path / "whole")
 
     def stop(iteration, loss):
         if iteration == 3:
             raise Stopped
 
     with pytest.raises(Stopped):
-        fit("sain", store, patient, tmp_path / "cut", on_step=stop, **words)
-    fit("sain", store, patient, tmp_path / "cut", **words)
+        fit("sain", store, patient, tmp_path / "cut", on_step=stop)
+    fit("sain", store, patient, tmp_path / "cut")
     for name in ("network.safetensors", "log.jsonl"):
         whole, cut = ((tmp_path / run / name).read_bytes() for run in ("whole", "cut"))
         assert whole == cut
@@ -188,13 +204,11 @@ def test_validation_pushes_are_drawn_at_random_and_not_trained_on(store):
     training, validation = set(task.training.rows), set(task.validation.rows)
     assert (len(training), len(validation)) == (16, 4)
     assert training | validation == set(range(20))
-    other = Task("in", store, replace(TUNING, seed=1), PLANAR)
+    other = Task("in", store, TUNING.changed(seed=1), PLANAR)
     assert set(other.validation.rows) != validation
     assert validation != set(range(16, 20))
     for share in (0.01, 0.99):  # of two pushes, one remains on either side
-        few = Task(
-            "in", store.first(2), replace(TUNING, validation_share=share), PLANAR
-        )
+        few = Task("in", store.first(2), TUNING.changed(validation_share=share), PLANAR)
         assert (len(few.training.rows), len(few.validation.rows)) == (1, 1)
 
 
@@ -214,15 +228,27 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     internal = identified_folder(tmp_path / "engine", **values)
     words = {"assumed_engine": str(tmp_path / "engine")}
     out = tmp_path / "out"
-    fit("sain", store, TUNING, out, start_from=str(start / "sain"), **words)
+    fit(
+        "sain",
+        store,
+        starting(TUNING, start / "sain"),
+        out,
+        **words,
+    )
     card = read_card(out)
     assert card.internal == internal
     model = load_model(str(out)).dynamics
     assert model.offset.vector == (1.5e-3, 0.0)
     assert model.dynamics.engine.assumptions == internal.simulator.assumptions
-    fit("sain", store, TUNING, tmp_path / "on", start_from=str(out), **words)
+    fit(
+        "sain",
+        store,
+        starting(TUNING, out),
+        tmp_path / "on",
+        **words,
+    )
     with pytest.raises(BadCheckpoint, match="internal engine is 'planar-"):
-        fit("sain", store, TUNING, tmp_path / "no", start_from=str(out))
+        fit("sain", store, starting(TUNING, out), tmp_path / "no")
     task = Task("sain", store, TUNING, find_internal_engine(str(tmp_path / "engine")))
     arrays = store.read(slice(0, 4), task.names)
     assert "simulated_planar" not in arrays
@@ -247,7 +273,7 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
 
 def test_error_terms_are_scaled_by_the_residual(store):
     batch = to_batch(store.read(slice(None)), store.info, simulated="planar")
-    found = loss_weights(batch, TUNING)
+    found = loss_weights(batch, TUNING.objective)
     last = np.asarray(batch.truth - batch.simulated, np.float64)[:, -1]
     place = np.mean(np.sum(last[..., :2] ** 2, axis=-1))
     np.testing.assert_allclose(found.position, 1 / place, rtol=1e-4)
@@ -259,25 +285,30 @@ def test_error_terms_are_scaled_by_the_residual(store):
 def test_invalid_starting_networks_are_refused(store, start, tmp_path):
     out = tmp_path / "out"
     with pytest.raises(BadCheckpoint, match="kind is 'in', this training's is 'sain'"):
-        fit("sain", store, TUNING, out, start_from=str(start / "in"))
+        fit("sain", store, starting(TUNING, start / "in"), out)
     for name in ("nowhere", "physics"):
         says = f"--start-from is '{name}'; it must be engine, in, sain, .*folder"
         with pytest.raises(UnknownName, match=says):
-            fit("in", store, TUNING, out, start_from=name)
+            fit("in", store, starting(TUNING, name), out)
     assert not out.exists()
 
 
 def test_a_network_around_another_engine_is_refused(store, tmp_path):
     with pytest.raises(BadCheckpoint, match="internal engine is 'bullet'"):
-        fit("sain", store, TUNING, tmp_path / "out", start_from="sain-bullet")
+        fit(
+            "sain",
+            store,
+            starting(TUNING, "sain-bullet"),
+            tmp_path / "out",
+        )
 
 
 def test_patience_needs_pushes_to_validate_on():
     with pytest.raises(BadInput, match="`patience` is 5"):
-        FitConfig(patience=5)
+        PAPER.changed(patience=5)
     for share in (1.0, 1.5, float("nan")):
         with pytest.raises(BadInput, match="`validation_share`"):
-            FitConfig(validation_share=share)
+            PAPER.changed(validation_share=share)
 
 
 def test_an_equal_loss_is_no_improvement(start):

@@ -13,8 +13,8 @@ from learning.stores import info_of, made_up
 from models.samples import network
 from sainet.datasets.batch import to_batch
 from sainet.learning.batch import predict_batch
-from sainet.learning.config import FitConfig
 from sainet.learning.held import unroll_held
+from sainet.learning.recipes import PAPER
 from sainet.learning.statistics import feature_scales
 from sainet.models.correctors.base import Start
 from sainet.models.frame import push_frame
@@ -123,4 +123,4 @@ def test_additive_outputs_are_scaled_by_the_engines_error(residual):
 
 def test_a_hold_of_zero_steps_is_refused():
     with pytest.raises(BadInput, match="`hold` is 0"):
-        FitConfig(hold=0)
+        PAPER.changed(hold=0)

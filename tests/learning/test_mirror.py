@@ -10,8 +10,8 @@ import pytest
 from learning.stores import info_of, made_up, quiet_store, single, write
 from sainet.datasets.batch import to_batch
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.learning.config import FitConfig
 from sainet.learning.mirror import mirror, mirror_some
+from sainet.learning.recipes import PAPER
 from sainet.learning.task import Task
 from sainet.models.library import find_internal_engine
 from sainet.scenes.state import pack_motion
@@ -74,8 +74,8 @@ def test_each_iteration_mirrors_half_of_the_pushes(tmp_path):
     info = info_of(200)
     store = write(tmp_path / "data", info, made_up(info))
     arrays = store.read(slice(None))
-    config = FitConfig(mirror=True)
-    task = Task("in", store, config, find_internal_engine("planar"))
+    recipe = PAPER.changed(mirror=True)
+    task = Task("in", store, recipe, find_internal_engine("planar"))
 
     def mirrored(task, iteration):
         seen = task.to_training_batch(arrays, 12, iteration)
@@ -86,7 +86,8 @@ def test_each_iteration_mirrors_half_of_the_pushes(tmp_path):
     assert 0.4 < first.mean() < 0.6
     np.testing.assert_array_equal(first, mirrored(task, 1))
     assert (first != mirrored(task, 2)).any()
-    for other in (replace(config, mirror=False), replace(config, features="place")):
-        assert not mirrored(replace(task, config=other), 1).any()
+    for change in ({"mirror": False}, {"features": "place"}):
+        other = recipe.changed(**change)
+        assert not mirrored(replace(task, recipe=other), 1).any()
     whole = task.to_batch(arrays, 12)
     assert_same(mirror_some(whole, 0, 1), task.to_training_batch(arrays, 12, 1))

@@ -22,7 +22,7 @@ from pathlib import Path
 import jax
 jax.config.update("jax_num_cpu_devices", 1)
 from sainet.datasets.store import open_store
-from sainet.learning.config import FitConfig
+from sainet.learning.recipes import PAPER
 from sainet.learning.fit import fit
 
 data, out, stop = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
@@ -32,7 +32,7 @@ def report(iteration, loss):
     if iteration == stop:
         time.sleep(600)
 
-config = FitConfig(
+config = PAPER.changed(
     iterations={ITERATIONS}, batch_size=6, average=10, log_every=5, checkpoint_every=10
 )
 fit("sain", open_store(data), config, out, on_step=report)

@@ -11,10 +11,11 @@ from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.learning.batch import predict_batch
-from sainet.learning.config import FitConfig
+from sainet.learning.checks import check_task
 from sainet.learning.fit import fit
+from sainet.learning.recipes import PAPER, SingleSteps
 from sainet.learning.single_steps import to_single_steps
-from sainet.learning.task import Task, begin, check_data
+from sainet.learning.task import Task, begin
 from sainet.models.card import read_card
 from sainet.models.dynamics import (
     LearnedDynamics,
@@ -29,8 +30,12 @@ from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.state import pack_motion
 
 PLANAR = find_internal_engine("planar")
-CONFIG = FitConfig(
-    iterations=60, batch_size=8, log_every=5, learning_rate=3e-3, recurrent=False
+CONFIG = PAPER.changed(
+    iterations=60,
+    batch_size=8,
+    log_every=5,
+    learning_rate=3e-3,
+    horizon=SingleSteps(),
 )
 
 
@@ -145,14 +150,14 @@ def around_bullet(tmp_path_factory):
 
 
 def test_bullet_cannot_restart_in_a_training(around_bullet, tmp_path):
-    with pytest.raises(BadInput, match="`assumed_engine` bullet"):
+    with pytest.raises(BadInput, match="`assumed_engine` is bullet"):
         fit("sain", around_bullet, CONFIG, tmp_path / "out", assumed_engine="bullet")
 
 
 def test_in_needs_no_restarting_engine(around_bullet):
     bullet = find_internal_engine("bullet")
     task = Task("in", around_bullet, CONFIG, bullet)
-    check_data(task)
+    check_task(task)
     state, _ = begin(task)
     assert np.isfinite(state.network.scales.body_deviation).all()
 

@@ -1,7 +1,5 @@
 """One gradient step: loss, gradient, devices, schedule, l2 and guards, taken apart."""
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,8 +11,8 @@ from models import naive
 from models.samples import network
 from sainet.datasets.batch import to_batch
 from sainet.learning.batch import predict_batch, to_target
-from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights
+from sainet.learning.recipes import PAPER, Objective, Optimiser
 from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import (
     data_loss,
@@ -118,8 +116,10 @@ def test_unobserved_steps_have_no_gradient(split_gradient):
 
 
 def test_training_does_not_touch_the_scales():
-    state = first_state(network("sain", "robot"), FitConfig(batch_size=PUSHES))
-    after, loss = make_step(FitConfig(batch_size=PUSHES), WEIGHTS)(state, batch_of())
+    state = first_state(network("sain", "robot"), Optimiser())
+    after, loss = make_step(PAPER.changed(batch_size=PUSHES), WEIGHTS)(
+        state, batch_of()
+    )
     wanted = plain_gradient(state.network, batch_of())[0] / PUSHES
     assert float(loss) == pytest.approx(float(wanted), rel=1e-5)
     assert int(after.iteration) == 1
@@ -134,8 +134,8 @@ def test_training_does_not_touch_the_scales():
 
 
 def test_l2_pulls_with_twice_the_weights():
-    config = FitConfig(batch_size=PUSHES, l2=1e-3, clip_norm=1e9)
-    state = first_state(network("in", "robot"), config)
+    config = PAPER.changed(batch_size=PUSHES, l2=1e-3, clip_norm=1e9)
+    state = first_state(network("in", "robot"), config.optimiser)
     nothing = jax.tree.map(jnp.zeros_like, WEIGHTS)
     after, loss = make_step(config, nothing)(state, batch_of("in"))
     assert float(loss) == 0
@@ -146,8 +146,8 @@ def test_l2_pulls_with_twice_the_weights():
 
 
 def test_l2_pulls_to_the_initial_weights():
-    config = FitConfig(batch_size=PUSHES, l2=1e-3, clip_norm=1e9)
-    state = first_state(network("in", "robot"), config)
+    config = PAPER.changed(batch_size=PUSHES, l2=1e-3, clip_norm=1e9)
+    state = first_state(network("in", "robot"), config.optimiser)
     nothing = jax.tree.map(jnp.zeros_like, WEIGHTS)
     start = jax.tree.map(lambda w: w + 0.1, trained_layers(state.network))
     after, _ = make_step(config, nothing, start)(state, batch_of("in"))
@@ -158,9 +158,9 @@ def test_l2_pulls_to_the_initial_weights():
 
 
 def test_the_default_l2_is_one_over_the_pushes():
-    config = FitConfig(l2=None)
-    assert config.for_pushes(25).l2 == 0.04
-    assert FitConfig(l2=0.0).for_pushes(25).l2 == 0
+    config = PAPER.changed(l2=None)
+    assert config.objective.for_pushes(25).l2 == 0.04
+    assert Objective(l2=0.0).for_pushes(25).l2 == 0
     with pytest.raises(ValueError, match="l2 is None"):
         make_step(config, WEIGHTS)
 
@@ -171,7 +171,7 @@ def adam_states(optimizer):
 
 
 def test_the_learning_rate_halves_every_so_many_iterations():
-    optimizer = make_optimizer(FitConfig(learning_rate=0.01, halve_every=4))
+    optimizer = make_optimizer(Optimiser(learning_rate=0.01, halve_every=4))
     weight = jnp.ones(3)
     state, sizes = optimizer.init(weight), []
     for _ in range(12):  # a constant gradient, so that Adam's step is the rate itself
@@ -182,7 +182,7 @@ def test_the_learning_rate_halves_every_so_many_iterations():
 
 
 def test_large_gradients_are_clipped_and_nan_skipped():
-    optimizer = make_optimizer(FitConfig(clip_norm=2.0))
+    optimizer = make_optimizer(Optimiser(clip_norm=2.0))
     weight = jnp.zeros(2)
     state = optimizer.init(weight)
     _, after = optimizer.update(jnp.array([30.0, 40.0]), state, weight)
@@ -260,8 +260,7 @@ def test_acceleration_scales_are_equal_for_x_and_y():
 @pytest.mark.parametrize("model", ["in", "sain"])
 def test_loss_terms_are_scaled_by_the_motion(model):
     batch = batch_of(model)
-    config = FitConfig(weight_position=2.0, weight_spin=3.0)
-    found = loss_weights(batch, config)
+    found = loss_weights(batch, Objective(weight_position=2.0, weight_spin=3.0))
     motion = np.asarray(batch.truth, np.float64)
     start = np.zeros((PUSHES, 1, 2, 3))
     start[..., :2] = batch.initial.position[:, None]
@@ -290,18 +289,18 @@ def still(arrays):
 def test_statistics_are_finite_for_incomplete_pushes(change, bodies):
     batch = batch_of(change=change, bodies=bodies)
     scales = feature_scales(batch, network("sain", "robot").features)
-    found = (scales, loss_weights(batch, FitConfig()))
+    found = (scales, loss_weights(batch, Objective()))
     assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(found))
 
 
 def test_averaged_weights_follow_tensorflow():
-    config, batch = FitConfig(average=4, learning_rate=1e-2), batch_of()
+    config, batch = PAPER.changed(average=4, learning_rate=1e-2), batch_of()
     step, plain = (
         make_step(config, WEIGHTS),
-        make_step(replace(config, average=0), WEIGHTS),
+        make_step(config.changed(average=0), WEIGHTS),
     )
-    state = first_state(network("sain", "robot"), config)
-    alone = first_state(network("sain", "robot"), replace(config, average=0))
+    state = first_state(network("sain", "robot"), config.optimiser)
+    alone = first_state(network("sain", "robot"), Optimiser(average=0))
     mean = trained_layers(alone.network)
     for done in range(12):
         state, alone = step(state, batch)[0], plain(alone, batch)[0]

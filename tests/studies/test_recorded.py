@@ -12,7 +12,6 @@ from sainet.models.card import read_card
 from sainet.runs.documents import read_json
 from sainet.runs.errors import BadInput
 from sainet.studies import (
-    few_pushes,
     fine_tuning,
     load_experiment,
     recorded_efficiency,
@@ -60,11 +59,9 @@ def make(chain, recorded, monkeypatch, tmp_path):
     monkeypatch.setattr(recorded_pushes, "ELSEWHERE", FEW[:2])
     monkeypatch.setattr(recorded_efficiency, "VARIANTS", FEW[1:2])
     monkeypatch.setattr(recorded_efficiency, "PUSHES", {"quick": (3, 5)})
-    monkeypatch.setattr(few_pushes, "_QUICK_ITERATIONS", 1)
     # Of one size, so that everything compiles once.
-    for name in ("FINE_TUNING", "RESIDUAL_TUNING"):
-        four = replace(getattr(few_pushes, name), batch_size=4)
-        monkeypatch.setattr(few_pushes, name, four)
+    small = lambda recipe, *_: recipe.changed(iterations=1, batch_size=4)  # noqa: E731
+    monkeypatch.setattr("sainet.studies.recorded_models.scaled", small)
     # It has tests of its own, and compiles for a minute.
     monkeypatch.setattr("sainet.studies.recorded_models.identify_into", identify)
     whole = replace(chain, recorded=recorded.path)

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from learning.stores import quiet_store
-from sainet.learning.config import FitConfig
 from sainet.learning.log import read_log
+from sainet.learning.recipes import PAPER, FromModel
 from sainet.models.card import read_card
 from sainet.runs.errors import RunConflict, SainetError
 from sainet.runs.workers import worker_pool
 from sainet.studies.chain import Chain
 from sainet.studies.trainings import Training, train_at_once
 
-CONFIG = FitConfig(iterations=20, batch_size=8, log_every=5)
+CONFIG = PAPER.changed(iterations=20, batch_size=8, log_every=5)
 SEEDS = (3, 4)
 
 
@@ -100,9 +100,10 @@ def test_parallel_training_gives_the_same_networks(store, tmp_path):
 
 
 def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
-    training = replace(both(store, tmp_path)["in"], start_from="some/in")
-    starts = [one.start_from for one in training.of_seeds(SEEDS)]
-    assert starts == ["some/in-seed-3", "some/in-seed-4"]
+    recipe = CONFIG.changed(start=FromModel("some/in"))
+    training = replace(both(store, tmp_path)["in"], recipe=recipe)
+    starts = [one.recipe.start for one in training.of_seeds(SEEDS)]
+    assert starts == [FromModel("some/in-seed-3"), FromModel("some/in-seed-4")]
 
 
 def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):

@@ -79,6 +79,7 @@ def save_problem(path: Path, problem: Problem) -> Path:
     Weights have axes ``[input, output]``.
     """
     network, weights = problem.state.network, problem.weights
+    optimiser = problem.recipe.optimiser
     arrays = _batch_arrays(problem)
     for name, layers in (("rel", network.rel), ("dyn", network.dyn)):
         for index, weight in enumerate(layers.weights):
@@ -90,11 +91,11 @@ def save_problem(path: Path, problem: Problem) -> Path:
         "feature_bound": FEATURE_BOUND,
         "gradient_bound": GRADIENT_BOUND,
         "gradient_sizes": GRADIENT_SIZES,
-        "pushes": problem.config.batch_size,
+        "pushes": optimiser.batch_size,
         "time_step": network.time_step,
-        "learning_rate": problem.config.learning_rate,
-        "clip_norm": problem.config.clip_norm,
-        "l2": problem.config.l2,
+        "learning_rate": optimiser.learning_rate,
+        "clip_norm": optimiser.clip_norm,
+        "l2": problem.recipe.objective.l2,
     }
     saved = {k: np.asarray(v) for k, v in (arrays | settings).items()}
     np.savez(path, **saved)  # pyright: ignore[reportArgumentType]
@@ -102,7 +103,7 @@ def save_problem(path: Path, problem: Problem) -> Path:
 
 
 def _batch_arrays(problem: Problem) -> dict[str, Any]:
-    size, whole = problem.config.batch_size, problem.batch
+    size, whole = problem.recipe.optimiser.batch_size, problem.batch
     if whole.simulated is None:
         raise ValueError("a batch for SAIN holds s-bar")
     frame = push_frame(whole.scene, whole.initial)

@@ -7,8 +7,8 @@ import jax
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.simulate import simulate_chunk, store_info
-from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights
+from sainet.learning.recipes import PAPER, Recipe
 from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import FitState, even_batch, first_state
 from sainet.models.correctors.interaction import InteractionNetwork
@@ -18,7 +18,7 @@ from sainet.models.features import feature_set
 class Problem(NamedTuple):
     """Inputs of a gradient step."""
 
-    config: FitConfig
+    recipe: Recipe
     state: FitState
     weights: LossWeights
     batch: PushBatch
@@ -35,13 +35,14 @@ def make_problem(pushes: int = 100, steps: int = 200) -> Problem:
     info = store_info(data)
     arrays = simulate_chunk(data, 0)
     batch = to_batch(arrays, info, steps=steps, simulated=data.assumed_engine[0])
-    config = FitConfig(batch_size=pushes, steps=steps)
+    recipe = PAPER.changed(batch_size=pushes, steps=steps)
     features = feature_set(info.kind, simulator=True)
     network = InteractionNetwork(
         features,
         time_step=info.time_step,
-        key=jax.random.key(config.seed),
+        key=jax.random.key(recipe.seed),
         scales=feature_scales(batch, features),
     )
-    weights = loss_weights(batch, config)
-    return Problem(config, first_state(network, config), weights, even_batch(batch))
+    weights = loss_weights(batch, recipe.objective)
+    state = first_state(network, recipe.optimiser)
+    return Problem(recipe, state, weights, even_batch(batch))

@@ -36,7 +36,7 @@ class TrainingLoop:
 
     def __init__(self, problem: Problem) -> None:
         """Compile and run the first iteration; `first_loss` is the loss before it."""
-        self._step = make_step(problem.config, problem.weights)
+        self._step = make_step(problem.recipe, problem.weights)
         self._batch = problem.batch
         # Match the step's output device; otherwise the second call compiles again.
         state = jax.device_put(problem.state, jax.devices()[0])

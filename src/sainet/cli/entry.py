@@ -4,7 +4,6 @@ import logging
 import sys
 from collections.abc import Sequence
 from functools import reduce
-from itertools import zip_longest
 from operator import or_
 from typing import Annotated, Any
 
@@ -26,7 +25,8 @@ from sainet.cli.output import finish
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.split import Split
-from sainet.cli.train import Train, going_on
+from sainet.cli.train import Train
+from sainet.cli.tune import Tune
 from sainet.runs.errors import BadInput, BadTable, SainetError
 from sainet.runs.interrupts import remembered_interrupts
 
@@ -37,6 +37,7 @@ _COMMANDS = {
     "split": Split,
     "add-bystander": AddBystander,
     "train": Train,
+    "tune": Tune,
     "evaluate": Evaluate,
     "identify": Identify,
     "control": Control,
@@ -46,25 +47,9 @@ _COMMANDS = {
 }
 
 
-def _command(words: Sequence[str]) -> Any:  # noqa: ANN401
-    """Return the type of all commands, with the defaults that hold for these words."""
-    start = _start_from(words)
-    default: dict[str, Any] = {} if start is None else {"default": going_on(start)}
-    parts = [
-        Annotated[kind, subcommand(name, **(default if kind is Train else {}))]
-        for name, kind in _COMMANDS.items()
-    ]
-    return reduce(or_, parts)
-
-
-def _start_from(words: Sequence[str]) -> str | None:
-    """Return what --start-from is given, if it is there: it decides the defaults."""
-    for word, following in zip_longest(words, words[1:], fillvalue=""):
-        name, equals, value = word.partition("=")
-        if name.replace("_", "-") == "--start-from":
-            return value if equals else following
-    return None
-
+_COMMAND: Any = reduce(
+    or_, (Annotated[kind, subcommand(name)] for name, kind in _COMMANDS.items())
+)
 
 _DESCRIPTION = """Simulator-augmented interaction networks for pushed disks.
 
@@ -72,7 +57,7 @@ Start with 'sainet demo', which runs the whole method at small scale."""
 
 INTERRUPTED = 130
 # Commands that an identical call resumes.
-_GOES_ON = (Demo, Generate, Import, Split, Train, Control, Reproduce)
+_GOES_ON = (Demo, Generate, Import, Split, Train, Tune, Control, Reproduce)
 
 
 def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
@@ -83,7 +68,7 @@ def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
         SystemExit: help was asked for (0), or there is no such command or option (2).
     """
     return tyro.cli(
-        _command(words),
+        _COMMAND,
         args=list(words) or ["--help"],
         prog="sainet",
         description=_DESCRIPTION,

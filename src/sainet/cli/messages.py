@@ -44,7 +44,10 @@ def _options(settings: Any) -> Iterator[str]:  # noqa: ANN401
     hints = get_type_hints(settings, include_extras=True)
     for field in fields(settings):
         hint = hints[field.name]
-        if is_dataclass(hint):
-            yield from _options(hint)
-        elif _POSITIONAL not in getattr(hint, "__metadata__", ()):
+        extras = getattr(hint, "__metadata__", ())
+        kind = get_args(hint)[0] if extras else hint
+        parts = [part for part in (kind, *get_args(kind)) if is_dataclass(part)]
+        for part in parts:
+            yield from _options(part)
+        if not parts and _POSITIONAL not in extras:
             yield field.name

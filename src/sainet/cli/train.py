@@ -1,89 +1,122 @@
 """`sainet train`."""
 
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-import tyro
-from tyro.conf import Positional
+from tyro.conf import AvoidSubcommands, Positional
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Output
 from sainet.cli.progress import progress_bar
-from sainet.learning.config import (
-    FINE_TUNING,
-    FROM_ENGINE,
-    RESIDUAL_TUNING,
-    FitConfig,
-    ModelKind,
-)
+from sainet.learning.recipes import PAPER, ModelKind, Recipe, SingleSteps
+from sainet.runs.errors import BadInput
 
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
-    """Train a network on stored pushes by the paper's recipe."""
+    """Train a network by the paper's recipe.
+
+    For few pushes, or to train a network further, use 'sainet tune'.
+    """
 
     model: Positional[ModelKind]
-    """in: the network alone. sain: around an engine's prediction."""
+    """Network: in (without an engine) or sain (around an engine)."""
     data: Path
     """Dataset to train on."""
     out: Path
-    """Run folder to write; the same settings go on where they stopped."""
+    """Run folder; identical settings resume."""
     assumed_engine: str = "planar"
-    """Engine whose prediction SAIN corrects: by its name in the dataset, or the folder
-    that `sainet identify` wrote."""
-    start_from: str | None = None
-    """Network to go on from: a shipped one or the folder of a trained one; or engine:
-    a new one that adds to the assumed engine's motion, nothing at first. Other defaults
-    hold then, for few recorded pushes: 'sainet train --start-from engine --help' shows
-    them, and with the name of a network the others."""
+    """Internal engine of SAIN: a simulator whose prediction the dataset contains, or
+    the folder of identified parameters ('sainet identify')."""
     group: str | None = None
     """Group of pushes to train on (default: all groups)."""
     pushes: int | None = None
-    """Pushes at the start of the dataset to train on; default: all."""
-    config: FitConfig = field(default_factory=FitConfig)
+    """Pushes to train on, from the start of the dataset (default: all)."""
+    single_steps: bool = False
+    """Train on single steps, each from the true state (the paper's figure 2c), instead
+    of whole pushes."""
+    start_from: str | None = None
+    """Not an option of this command: use 'sainet tune --start' (default: random
+    weights)."""
+    recipe: Annotated[Recipe, AvoidSubcommands] = PAPER
     devices: int | None = None
-    """CPU devices to split a batch over; default: one a core."""
+    """CPU devices to split each batch over (default: one per core)."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> dict[str, Any]:
-        """Train the network and draw its learning curve."""
-        use_devices(self.devices)
+        """Train the network and draw its learning curve.
+
+        Raises:
+            BadInput: a network to start from is given.
+        """
+        if self.start_from is not None:
+            raise BadInput(
+                f"`start_from` is {self.start_from}; 'sainet train' starts with random "
+                f"weights, use 'sainet tune {self.model} --start {self.start_from}'."
+            )
+        recipe = self.recipe
+        if self.single_steps:
+            recipe = recipe.changed(horizon=SingleSteps(steps=recipe.horizon.steps))
+        return Job(
+            self.model,
+            self.data,
+            self.out,
+            self.assumed_engine,
+            group=self.group,
+            pushes=self.pushes,
+        ).run(recipe, self.devices, self.output)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A network to train, and on which pushes."""
+
+    model: ModelKind
+    data: Path
+    out: Path
+    engine: str  # internal: a simulator, or the folder of identified parameters
+    _: KW_ONLY
+    group: str | None  # None: all
+    pushes: int | None  # from the start of the dataset; None: all
+
+    def run(
+        self, recipe: Recipe, devices: int | None, output: Output
+    ) -> dict[str, Any]:
+        """Train the network, with a progress bar, and draw its learning curve.
+
+        Returns:
+            The JSON object of the command.
+        """
+        use_devices(devices)
         from sainet.datasets.store import open_store
         from sainet.learning.fit import fit
+        from sainet.learning.log import loss_note
         from sainet.studies.curves import draw_history
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
         store = store if self.pushes is None else store.first(self.pushes)
-        done = 0
-        title = f"Training {self.model.upper()}"
-        with progress_bar(title, self.config.iterations, self.output) as advance:
+        done, name = 0, self.model.upper()
+        total = recipe.optimiser.iterations
+        with progress_bar(f"Training {name}", total, output) as advance:
 
-            def on_step(iteration: int, loss: float) -> None:
+            def on_step(iteration: int, loss: float | None) -> None:
                 nonlocal done
-                advance(iteration - done, f"loss {loss:.3g}")
+                advance(iteration - done, loss_note(loss))
                 done = iteration
 
             result = fit(
                 self.model,
                 store,
-                self.config,
+                recipe,
                 self.out,
-                assumed_engine=self.assumed_engine,
-                start_from=self.start_from,
+                assumed_engine=self.engine,
                 on_step=on_step,
             )
         curve = draw_history(
             self.model, result.history, self.out / "learning-curve.svg"
         )
-        self.output.say(f"{self.model.upper()} is in {self.out}, its curve in {curve}")
+        output.say(f"{name} is in {self.out}, its learning curve in {curve}")
         loss = result.history[-1]["loss"] if result.history else None
         return {"out": str(self.out), "model": self.model, "loss": loss}
-
-
-def going_on(start_from: str) -> Train:
-    """Return the defaults that hold when training goes on from a network or engine."""
-    needed: Any = tyro.MISSING
-    config = RESIDUAL_TUNING if start_from == FROM_ENGINE else FINE_TUNING
-    return Train(model=needed, data=needed, out=needed, config=config)

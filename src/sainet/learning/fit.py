@@ -1,9 +1,9 @@
-"""The training loop: resumes after any interruption to the same weights."""
+"""The training loop, which resumes after interruptions to the same weights."""
 
 import logging
 import warnings
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,10 @@ from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
 from sainet.learning.best import Best
-from sainet.learning.config import FitConfig, ModelKind
+from sainet.learning.checks import check_task
 from sainet.learning.log import append_log, read_log, rewind_log
 from sainet.learning.loss import LossWeights
+from sainet.learning.recipes import FROM_ENGINE, FromModel, ModelKind, Recipe, Start
 from sainet.learning.step import (
     FitState,
     data_loss,
@@ -25,7 +26,7 @@ from sainet.learning.step import (
     make_step,
     trained_layers,
 )
-from sainet.learning.task import FROM_ENGINE, Start, Task, begin, check_data, settings
+from sainet.learning.task import Existing, Task, begin, settings
 from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_network
@@ -49,7 +50,7 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class FitResult:
-    """A trained network's folder and what was logged on the way."""
+    """A trained network's folder and the log of its training."""
 
     folder: Path
     history: list[dict[str, Any]]
@@ -58,72 +59,71 @@ class FitResult:
 def fit(
     model: ModelKind,
     store: Store,
-    config: FitConfig,
+    recipe: Recipe,
     out: Path,
     *,
     assumed_engine: str = "planar",
-    start_from: str | None = None,
-    on_step: Callable[[int, float], None] = lambda iteration, loss: None,
+    on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
 ) -> FitResult:
-    """Train a network, or go on with an interrupted training.
+    """Train a network, or resume an interrupted training run.
 
     Args:
         model: `in` or `sain`.
         store: training data.
-        config: of the training.
+        recipe: with the start of training; `recipe_for` returns the one that fits a
+            start.
         out: the run folder.
-        assumed_engine: whose prediction SAIN sees: by its name in the store, or the
-            folder of an identified engine, which then predicts as it is needed.
-        start_from: the network to go on from, by its name or folder; None draws one.
-            `engine` draws one that adds to the assumed engine, and adds nothing yet.
-        on_step: told the finished iterations and the loss that was last logged.
+        assumed_engine: internal engine of SAIN: its name in the store, or the folder of
+            identified parameters, whose prediction is then computed.
+        on_step: called with the number of finished iterations and the last logged loss,
+            None before the first.
 
     Raises:
-        RunConflict: the folder holds something else.
-        BadStore: the data lack what the network needs.
-        BadCheckpoint: training cannot go on from that network.
-        Diverged: the loss left the finite numbers for good.
+        RunConflict: the folder contains something else.
+        BadStore: the data lack inputs of the network.
+        BadCheckpoint: training cannot start from that network.
+        Diverged: the loss became NaN or infinite.
     """
     assumed = find_internal_engine(assumed_engine)
-    from_engine = start_from == FROM_ENGINE
-    start = None if from_engine else _start(start_from)
-    config = config.for_pushes(store.info.pushes)
-    task = Task(model, store, config, assumed, start, from_engine)
-    check_data(task)
+    objective = recipe.objective.for_pushes(store.info.pushes)
+    recipe = replace(recipe, objective=objective)
+    task = Task(model, store, recipe, assumed, _existing(recipe.start))
+    check_task(task)
     devices = jax.device_count()
     folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
     if folder.is_finished:
-        _log.info("%s is finished already", out)
+        _log.info("%s is already finished", out)
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
     state, weights = begin(task)
-    goes_on = task.start is not None or task.from_engine
-    drawn_to = trained_layers(state.network) if goes_on else None
+    is_fresh = task.existing is None and not task.is_additive
+    drawn_to = None if is_fresh else trained_layers(state.network)
     validate = _make_validation(task, weights)
     best = Best.first(state.network, validate(state.network)) if validate else None
     if (out / STATE).is_file():
         state, best = load_arrays(out / STATE, (state, best))
     history = rewind_log(out, int(state.iteration))
-    # Where the step leaves it: otherwise its first call compiles a second time.
+    # Match the step's output device: otherwise its second call compiles again.
     state = jax.device_put(state, jax.devices()[0])
     progress = Progress(state, best, history)
-    step = make_step(config, weights, drawn_to)
+    step = make_step(recipe, weights, drawn_to)
     _iterate(task, progress, step, validate, out=out, on_step=on_step)
     _finish(task, progress, folder)
     return FitResult(out, history)
 
 
-def _start(name: str | None) -> Start | None:
-    if name is None:
+def _existing(start: Start) -> Existing | None:
+    if not isinstance(start, FromModel):
         return None
+    name = start.model
     if name not in SHIPPED and not Path(name).exists():
         known = ", ".join((FROM_ENGINE, *SHIPPED))
         raise UnknownName(
-            f"`start_from` is {name!r}; it must be {known}, or the folder of a trained "
+            f"`start` is {name!r}; it must be {known}, or the folder of a trained "
             "network."
         )
     folder = network_folder(name)
-    return Start(*load_network(folder), folder)
+    return Existing(*load_network(folder), folder)
 
 
 def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
@@ -142,15 +142,15 @@ def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
 
 @dataclass
 class Progress:
-    """What changes while training: enough to go on from."""
+    """Everything that changes while training: enough to resume."""
 
     state: FitState
-    best: Best | None  # where pushes are kept for validation
+    best: Best | None  # None without validation pushes
     history: list[dict[str, Any]]
 
     @property
     def network(self) -> InteractionNetwork:
-        """The network that training would end with now."""
+        """The network with which training would end now."""
         network = self.state.result
         return network if self.best is None else self.best.put_into(network)
 
@@ -162,26 +162,25 @@ def _iterate(
     validate: Validate | None,
     *,
     out: Path,
-    on_step: Callable[[int, float], None],
+    on_step: Callable[[int, float | None], None],
 ) -> None:
-    config, history = task.config, progress.history
-    size, seed = config.batch_size, config.seed
+    recipe, history = task.recipe, progress.history
+    size, seed, total = recipe.optimiser.batch_size, recipe.seed, task.iterations
     reader = BatchReader(task.training, task.names, size, seed, complete=task.complete)
     try:
-        for iteration in range(
-            int(progress.state.iteration) + 1, config.iterations + 1
-        ):
+        for iteration in range(int(progress.state.iteration) + 1, total + 1):
             raise_if_interrupted()
             arrays = reader.batch(iteration - 1)
             batch = even_batch(task.to_training_batch(*arrays, iteration))
             progress.state, loss = step(progress.state, batch)
-            last = iteration == config.iterations
-            if iteration % config.log_every == 0 or last:
+            last = iteration == total
+            if iteration % recipe.log_every == 0 or last:
                 _log_line(progress, iteration, float(loss), validate, out)
-            if iteration % config.checkpoint_every == 0 or last:
+            if iteration % recipe.checkpoint_every == 0 or last:
                 save_arrays(out / STATE, (progress.state, progress.best))
-            on_step(iteration, history[-1]["loss"] if history else float("nan"))
-            if progress.best and progress.best.is_stale(iteration, config.patience):
+            on_step(iteration, history[-1]["loss"] if history else None)
+            patience = recipe.stopping.patience
+            if progress.best and progress.best.is_stale(iteration, patience):
                 break
     finally:
         reader.close()
@@ -215,13 +214,13 @@ def _check_finite(line: dict[str, Any], out: Path) -> None:
 
 
 def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
-    """Return what measures the loss on the pushes that are kept for validation."""
+    """Return a function that measures the loss on the validation pushes, if any."""
     if task.validation is None:
         return None
     arrays = task.validation.read(slice(None), task.names)
     batch = task.to_batch(arrays, task.store.info.steps)
     known = int(batch.is_observed.sum())
-    # Arguments all: XLA would spend seconds on folding what a function holds.
+    # All as arguments: XLA would spend seconds on folding constants of a closure.
     loss = jax.jit(data_loss)
     return lambda network: float(loss(network, batch, weights)) / known
 
@@ -229,7 +228,7 @@ def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
 def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
     info, sain, history = task.store.info, task.model == "sain", progress.history
     data = save_arrays(folder.path / WEIGHTS, progress.network)
-    start = task.start.card if task.start else None
+    start = task.existing.card if task.existing else None
     seeds = () if start is None else start.data_seeds
     card = Card(
         identity=_identity(task),
@@ -242,9 +241,9 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         pushes=_pushes(task.store, start),
         weights=content_hash(data),
         started_from=start.weights if start else None,
-        recurrent=task.config.recurrent,
+        recurrent=not task.has_single_steps,
         residual=isinstance(progress.network.integrator, RelaxingResidual),
-        config=asdict(task.config),
+        config=task.recipe.settings(),
         manifest=read_json(folder.path / MANIFEST),
         final_loss=history[-1]["loss"] if history else None,
     )
@@ -258,20 +257,20 @@ def _identity(task: Task) -> ModelId:
         kind=task.model,
         simulator=task.inner.simulator if task.inner else None,
         data=_training_data(task),
-        features=task.config.features,
-        variant="" if task.config.recurrent else "single-steps",
+        features=task.recipe.features,
+        variant="single-steps" if task.has_single_steps else "",
     )
 
 
 def _training_data(task: Task) -> TrainingData:
-    if task.from_engine:
+    if task.is_additive:
         return "residual"
-    if task.start is None:
+    if task.existing is None:
         return "real" if task.store.info.is_recorded else "paper"
     if task.store.info.is_recorded:
         return "tuned"
     is_stroke = task.store.info.bodies == 1  # long pushes of one disk
-    return "stroke" if is_stroke else task.start.card.identity.data
+    return "stroke" if is_stroke else task.existing.card.identity.data
 
 
 def _pushes(store: Store, start: Card | None) -> str:

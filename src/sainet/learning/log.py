@@ -1,4 +1,4 @@
-"""The log of a training: JSON lines, the same after a resume."""
+"""The log of a training run: JSON lines, equal after an interruption."""
 
 import json
 from pathlib import Path
@@ -11,10 +11,10 @@ LOG = "log.jsonl"
 
 
 def read_log(folder: Path) -> list[dict[str, Any]]:
-    """Return the lines of a log; a line that was cut by a crash is left out.
+    """Return the lines of a log, without a last line that a crash cut.
 
     Raises:
-        BadCheckpoint: a whole line is none of ours.
+        BadCheckpoint: another line is damaged.
     """
     path = folder / LOG
     if not path.is_file():
@@ -31,13 +31,18 @@ def _parsed(path: Path, number: int, line: bytes) -> dict[str, Any]:
     except (ValueError, TypeError, LookupError, RecursionError):
         pass
     raise BadCheckpoint(
-        f"{path}: line {number} is damaged; it must hold iteration and loss. Delete "
+        f"{path}: line {number} is damaged; it must have iteration and loss. Delete "
         "that line (the network does not depend on it) and run the same command again."
     )
 
 
+def loss_note(loss: float | None) -> str:
+    """Return a loss for a progress bar: nothing before the first is logged."""
+    return "" if loss is None else f"loss {loss:.3g}"
+
+
 def rewind_log(folder: Path, iteration: int) -> list[dict[str, Any]]:
-    """Forget what was logged after the checkpoint that training goes on from."""
+    """Return the lines up to a checkpoint's iteration; delete the others."""
     kept = [line for line in read_log(folder) if line["iteration"] <= iteration]
     text = "".join(json.dumps(line) + "\n" for line in kept)
     write_bytes(folder / LOG, text.encode())

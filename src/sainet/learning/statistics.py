@@ -9,8 +9,8 @@ from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
 from sainet.learning.batch import path_to_frame
-from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights
+from sainet.learning.recipes import Objective
 from sainet.models.correctors.interaction import Scales
 from sainet.models.features import FeatureSet
 from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
@@ -75,40 +75,42 @@ def feature_scales(
 def _spread(features: Array) -> tuple[Array, Array]:
     rows = features.reshape(features.shape[0], -1)
     mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
-    # A feature that never varies, a fixed mass say, must not be divided by rounding.
+    # A feature that never varies must not be divided by rounding errors.
     varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
     return mean, jnp.where(varies, deviation, 1.0)
 
 
 @eqx.filter_jit
-def loss_weights(batch: PushBatch, config: FitConfig) -> LossWeights:
-    """Return the settings over mean squares in the data.
+def loss_weights(batch: PushBatch, objective: Objective) -> LossWeights:
+    """Return the weights of the objective over mean squares in the data.
 
-    Those of the motion, or of the errors that s-bar makes where the truth was observed:
-    errors are what training is to make small, and where one end of a push alone is
-    known, position and rotation would else count very unequally.
+    The mean squares are those of the motion, or of the errors of s-bar where the truth
+    was observed: training is to reduce errors, and where only the end of a push is
+    known, position and rotation would otherwise have very unequal weights.
     """
-    pose, rate = _motion(batch) if config.terms == "motion" else _errors(batch)
+    by_motion = objective.terms == "motion"
+    pose, rate = _motion(batch) if by_motion else _errors(batch)
     place = jnp.nanmean(jnp.sum(pose[..., 0:2] ** 2, axis=-1))
     velocity = jnp.nanmean(jnp.sum(rate[..., 0:2] ** 2, axis=-1))
+    turn = jnp.nanmean(pose[..., 2] ** 2)
     return LossWeights(
-        position=config.weight_position / _nonzero(place),
-        rotation=config.weight_rotation / _nonzero(jnp.nanmean(pose[..., 2] ** 2)),
-        velocity=config.weight_velocity / _nonzero(velocity),
-        spin=config.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
-        linear_from=config.linear_from,
+        position=objective.weight_position / _nonzero(place),
+        rotation=objective.weight_rotation / _nonzero(turn),
+        velocity=objective.weight_velocity / _nonzero(velocity),
+        spin=objective.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
+        linear_from=objective.linear_from,
     )
 
 
 def _motion(batch: PushBatch) -> tuple[Array, Array]:
-    """Return how far things have moved and how fast they do."""
+    """Return how far bodies have moved, and their velocities."""
     motion = _known_motion(batch)
     start = pack_motion(batch.initial)[:, None]
     return motion[..., 0:3] - start[..., 0:3], motion[..., 3:6]
 
 
 def _errors(batch: PushBatch) -> tuple[Array, Array]:
-    """Return how wrong s-bar is, NaN where the truth was not observed."""
+    """Return the errors of s-bar, NaN where the truth was not observed."""
     assert batch.simulated is not None
     error = batch.truth - batch.simulated
 
@@ -136,12 +138,12 @@ def _correction(batch: PushBatch, integrator: RelaxingResidual) -> Array:
 
 
 def _nonzero(size: Array) -> Array:
-    """Return a size, or 1 where there is none: of a disk that never turns, say."""
+    """Return a size, or 1 where it is zero, for example of a disk that never turns."""
     return jnp.where(size > _STILL, size, 1.0)
 
 
 def _known_motion(batch: PushBatch) -> Array:
-    """Return the true motion, or the simulated one where the truth is not known."""
+    """Return the true motion, or the simulated motion where the truth is unknown."""
     if batch.simulated is None:
         return jnp.nan_to_num(batch.truth)
     return jnp.where(jnp.isnan(batch.truth), batch.simulated, batch.truth)

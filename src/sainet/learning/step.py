@@ -16,45 +16,45 @@ from jaxtyping import Array
 from sainet.datasets.batch import PushBatch
 from sainet.engines.devices import BATCH, batch_mesh
 from sainet.learning.batch import predict_batch, to_target
-from sainet.learning.config import FitConfig
 from sainet.learning.loss import LossWeights, push_losses
+from sainet.learning.recipes import Optimiser, Recipe
 from sainet.models.correctors.interaction import InteractionNetwork
 
 _MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
-_CHUNK = 500  # pushes at a time: those of single steps are 20,000, and leave the cache
+_MICROBATCH = 500  # pushes at a time: 20,000 single steps would leave the cache
 
 Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
 
 
 class FitState(eqx.Module):
-    """All that changes while training: enough to go on from, bit for bit."""
+    """Everything that changes while training: enough to resume, bit for bit."""
 
     network: InteractionNetwork
     optimizer: Any
     iteration: Array
-    average: Trained | None = None  # of the layers, where that is asked for
+    average: Trained | None = None  # of the layers, if the recipe averages
 
     @property
     def result(self) -> InteractionNetwork:
-        """The network that training would end with now."""
+        """The network with which training would end now."""
         if self.average is None:
             return self.network
         return with_layers(self.network, self.average)
 
 
-def make_optimizer(config: FitConfig) -> optax.GradientTransformation:
+def make_optimizer(optimiser: Optimiser) -> optax.GradientTransformation:
     """Return Adam with the paper's schedule, guarded against steps that explode."""
     schedule = optax.exponential_decay(
-        config.learning_rate, config.halve_every, 0.5, staircase=True
+        optimiser.learning_rate, optimiser.halve_every, 0.5, staircase=True
     )
     chain = optax.chain(
-        optax.clip_by_global_norm(config.clip_norm), optax.adam(schedule)
+        optax.clip_by_global_norm(optimiser.clip_norm), optax.adam(schedule)
     )
     return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
 
 
 def trained_layers(network: InteractionNetwork) -> Trained:
-    """Return the part of a network that is trained: all but its scales."""
+    """Return the part of a network that is trained: all except its scales."""
     return network.rel, network.dyn
 
 
@@ -63,23 +63,21 @@ def with_layers(network: InteractionNetwork, layers: Trained) -> InteractionNetw
     return eqx.tree_at(trained_layers, network, layers)
 
 
-def first_state(network: InteractionNetwork, config: FitConfig) -> FitState:
+def first_state(network: InteractionNetwork, optimiser: Optimiser) -> FitState:
     """Return the state before the first iteration."""
     layers = trained_layers(network)
-    optimizer = make_optimizer(config).init(layers)
-    average = layers if config.average else None
-    return FitState(network, optimizer, jnp.zeros((), jnp.int32), average)
+    moments = make_optimizer(optimiser).init(layers)
+    average = layers if optimiser.average else None
+    return FitState(network, moments, jnp.zeros((), jnp.int32), average)
 
 
-def _averaged(
-    average: Trained, layers: Trained, config: FitConfig, done: Array
-) -> Trained:
-    """Return the exponential mean, over fewer iterations while there are few.
+def _averaged(average: Trained, layers: Trained, span: int, done: Array) -> Trained:
+    """Return the exponential mean, over a shorter span in the first iterations.
 
-    It must not remember for long how training began: the share of the new is that of
-    TensorFlow's `ExponentialMovingAverage` with `num_updates`.
+    The first weights must not stay in it for long: the share of the new weights is that
+    of TensorFlow's `ExponentialMovingAverage` with `num_updates`.
     """
-    share = jnp.maximum(1 / config.average, 9 / (10 + done))
+    share = jnp.maximum(1 / span, 9 / (10 + done))
     return optax.incremental_update(layers, average, share)
 
 
@@ -96,13 +94,13 @@ def make_gradient(
 ) -> Callable[[InteractionNetwork, PushBatch], tuple[Array, Trained]]:
     """Return a function that sums loss and gradient over a batch on all devices.
 
-    The sums of the devices come together outside of what is compiled. XLA's own
-    all-reduce blocks a thread of the pool that the other device works with; on two
-    busy cores it was seen to wait for itself until it aborted the process.
+    The sums of the devices are added outside of the compiled function. XLA's all-reduce
+    blocks a thread of the pool that the other device works with; on two busy cores it
+    waited for itself until it aborted the process.
 
-    Between devices JAX spends its time on the number of arrays, not on their size:
-    networks and gradients go as one array each. A batch goes by way of the host, where
-    it is not copied and every device takes its part.
+    The time of a transfer between devices depends on the number of arrays, not on their
+    size: networks and gradients are one array each. Batches are transferred through the
+    host, which does not copy them.
     """
     everywhere = NamedSharding(batch_mesh(), PartitionSpec())
     parts = NamedSharding(batch_mesh(), PartitionSpec(BATCH))
@@ -132,7 +130,7 @@ def _sum_on_devices(
     to_network: Callable[[Array], InteractionNetwork],
     hold: int,
 ) -> tuple[Array, Array]:
-    """Return the losses ``[chunk]`` and gradients ``[chunk number]`` of all devices."""
+    """Return losses ``[part]`` and gradients ``[part number]`` of all devices."""
 
     def of_part(
         weights: LossWeights, numbers: Array, batch: PushBatch
@@ -152,83 +150,87 @@ def _sum_on_devices(
 def _sum_of_part(
     weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
 ) -> tuple[Array, Array]:
-    """Return the losses ``[chunk]`` and gradients ``[chunk number]`` of a device."""
+    """Return losses ``[part]`` and gradients ``[part number]`` of a device."""
 
-    def loss(layers: Trained, chunk: PushBatch) -> Array:
-        return data_loss(with_layers(network, layers), chunk, weights, hold)
+    def loss(layers: Trained, part: PushBatch) -> Array:
+        return data_loss(with_layers(network, layers), part, weights, hold)
 
-    def gradient(chunk: PushBatch) -> tuple[Array, Array]:
-        found, layers = jax.value_and_grad(loss)(trained_layers(network), chunk)
+    def gradient(part: PushBatch) -> tuple[Array, Array]:
+        found, layers = jax.value_and_grad(loss)(trained_layers(network), part)
         return found, ravel_pytree(layers)[0]
 
-    count = _chunk_count(batch.size)
-    chunks = jax.tree.map(lambda x: x.reshape(count, -1, *x.shape[1:]), batch)
-    return lax.map(gradient, chunks)
+    count = _microbatch_count(batch.size)
+    parts = jax.tree.map(lambda x: x.reshape(count, -1, *x.shape[1:]), batch)
+    return lax.map(gradient, parts)
 
 
-def _chunk_count(pushes: int) -> int:
-    return -(-pushes // _CHUNK)
+def _microbatch_count(pushes: int) -> int:
+    return -(-pushes // _MICROBATCH)
 
 
 @jax.jit
 def _total(sums: tuple[Array, Array], layers: Trained) -> tuple[Array, Trained]:
-    """Return the sum over all chunks, the gradient in the form of the layers."""
+    """Return the sum over all microbatches; the gradient has the form of the layers."""
     losses, rows = sums
     to_layers = ravel_pytree(layers)[1]
     return jnp.sum(losses), to_layers(jnp.sum(rows, axis=0))
 
 
 def make_step(
-    config: FitConfig, weights: LossWeights, start: Trained | None = None
+    recipe: Recipe, weights: LossWeights, start: Trained | None = None
 ) -> Callable[[FitState, PushBatch], tuple[FitState, Array]]:
     """Return the gradient step; its parts are compiled.
 
-    With layers to go on from, l2 draws towards these and not towards zero.
+    Args:
+        recipe: with a number for l2, see `Objective.for_pushes`.
+        weights: of the loss.
+        start: layers that l2 draws towards; None is zero.
 
-    It takes the state, on the first device, and a batch that `even_batch` has filled
-    up, and returns the next state and the mean loss of the pushes, l2 left out.
+    Returns:
+        A function of the state, on the first device, and of a batch that `even_batch`
+        filled up. It returns the next state and the mean loss of the pushes without l2.
     """
-    if config.l2 is None:
-        raise ValueError("l2 is None; take the settings of FitConfig.for_pushes")
-    gradient, l2 = make_gradient(weights, config.hold), config.l2
+    if recipe.objective.l2 is None:
+        raise ValueError("l2 is None; call Objective.for_pushes first")
+    gradient, l2 = make_gradient(weights, recipe.horizon.hold), recipe.objective.l2
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
         pushes = jnp.sum(batch.is_observed)
-        after = _update(state, start, summed, pushes, config=config, l2=l2)
+        after = _update(state, start, summed, pushes, optimiser=recipe.optimiser, l2=l2)
         return after, total / pushes
 
     return step
 
 
-# Compiled once for each set of settings, however many networks are trained by them.
-@partial(jax.jit, static_argnames=("config", "l2"))
+# Compiled once for each set of settings, for any number of networks.
+@partial(jax.jit, static_argnames=("optimiser", "l2"))
 def _update(
     state: FitState,
     start: Trained | None,
     summed: Trained,
     pushes: Array,
     *,
-    config: FitConfig,
+    optimiser: Optimiser,
     l2: float,
 ) -> FitState:
     """Take Adam's step along the mean gradient of so many pushes, l2 added."""
     layers = trained_layers(state.network)
     change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
     mean = jax.tree.map(lambda g, w: g / pushes + 2 * l2 * w, summed, change)
-    updates, moments = make_optimizer(config).update(mean, state.optimizer, layers)
+    updates, moments = make_optimizer(optimiser).update(mean, state.optimizer, layers)
     layers = optax.apply_updates(layers, updates)
     average = state.average
     if average is not None:
-        average = _averaged(average, layers, config, state.iteration)
+        average = _averaged(average, layers, optimiser.average, state.iteration)
     network = with_layers(state.network, layers)
     return FitState(network, moments, state.iteration + 1, average)
 
 
 def even_batch(batch: PushBatch) -> PushBatch:
-    """Repeat the last push, unobserved, until devices and chunks divide the batch."""
+    """Repeat the last push, unobserved, until all microbatches have one size."""
     devices = jax.device_count()
-    extra = -batch.size % (devices * _chunk_count(-(-batch.size // devices)))
+    extra = -batch.size % (devices * _microbatch_count(-(-batch.size // devices)))
     if not extra:
         return batch
     padded = jax.tree.map(

@@ -11,8 +11,9 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import Store, open_store
 from sainet.evaluation.evaluate import Evaluation, evaluate
-from sainet.learning.config import FitConfig, ModelKind
 from sainet.learning.fit import FitResult
+from sainet.learning.log import loss_note
+from sainet.learning.recipes import ModelKind, Recipe
 from sainet.models.library import PHYSICS, load_model
 from sainet.models.model import Model
 from sainet.runs.documents import write_json
@@ -51,17 +52,14 @@ class Chain:
         self,
         model: ModelKind,
         store: Store,
-        config: FitConfig,
+        recipe: Recipe,
         *,
         name: str | None = None,
         assumed_engine: str = "planar",
-        start_from: str | None = None,
     ) -> FitResult:
         """Train a network into a folder of that name, by default of its own."""
         out = self.out / (name or model)
-        return self._train(
-            Training(model, store, config, out, assumed_engine, start_from)
-        )
+        return self._train(Training(model, store, recipe, out, assumed_engine))
 
     def train_seeds(
         self, trainings: Mapping[str, Training], seeds: Sequence[int]
@@ -80,17 +78,17 @@ class Chain:
             if training not in left:
                 self._train(training)
         if self.trainers is not None and left:
-            total = sum(training.config.iterations for training in left)
+            total = sum(training.iterations for training in left)
             with self._counting(f"Training {len(left)} networks", total) as on_step:
                 train_at_once(left, self.trainers, on_step)
         return {name: [one.name for one in those] for name, those in several.items()}
 
     def _train(self, training: Training) -> FitResult:
-        total = training.config.iterations
+        total = training.iterations
         with self._counting(f"Training {training.name.upper()}", total) as on_step:
-            result = training.run(lambda done, loss: on_step(done, f"loss {loss:.3g}"))
-            last = result.history[-1:]
-            on_step(total, "".join(f"loss {line['loss']:.3g}" for line in last))
+            result = training.run(lambda done, loss: on_step(done, loss_note(loss)))
+            last = result.history[-1]["loss"] if result.history else None
+            on_step(total, loss_note(last))
         return result
 
     @contextmanager

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from sainet.learning.config import FitConfig
+from sainet.learning.recipes import PAPER
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
@@ -54,5 +54,5 @@ def _shorter(setup: PaperSetup, pushes: int) -> dict[str, Any]:
         "pushes": pushes,
         "form": f"{pushes}-pushes",
         "iterations": max(setup.sizes.iterations // _SHORTER, 1),
-        "halve_every": FitConfig.halve_every // _SHORTER,
+        "halve_every": PAPER.optimiser.halve_every // _SHORTER,
     }

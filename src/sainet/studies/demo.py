@@ -12,7 +12,7 @@ from sainet.control.trials import run_trials
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import PAPER_STEPS, Evaluation
-from sainet.learning.config import FitConfig
+from sainet.learning.recipes import PAPER
 from sainet.models.model import Model
 from sainet.report.episode_frames import outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
@@ -97,7 +97,7 @@ def _simulate_and_train(chain: Chain, config: DemoConfig) -> Store:
         "[bold]2[/] Training the network alone (IN), then around the engine (SAIN)."
     )
     quarter = max(config.iterations // 4, 1)
-    recipe = FitConfig(
+    recipe = PAPER.changed(
         iterations=config.iterations,
         halve_every=quarter,
         learning_rate=2e-3,
@@ -128,7 +128,7 @@ def _draw(
         summary=_SUMMARY.format(
             pushes=config.pushes,
             iterations=config.iterations,
-            paper=FitConfig().iterations,
+            paper=PAPER.optimiser.iterations,
         ),
         table=evaluation.to_dict(),
         figures=(

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from sainet.datasets.store import Store
-from sainet.learning.config import FROM_ENGINE
+from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.few_pushes import recipe
 from sainet.studies.paper_setup import join
 from sainet.studies.surrogate import ROBOTS, Robot, recordings
+from sainet.studies.trainings import scaled
 
 Change = dict[str, Any]
 
@@ -90,12 +90,11 @@ class _Tuner:
     def tune(self, start: str, change: Change) -> dict[str, Any]:
         """Return the table of the tests."""
         pushes = self.training.info.pushes
-        config = recipe(start, self.scale, pushes, change)
+        recipe = recipe_for(start_named(start)).changed(**change)
         way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
         name = f"{self.robot}/{pushes}-pushes/{way}"
-        result = self.chain.train(
-            "sain", self.training, config, name=name, start_from=start
-        )
+        recipe = scaled(recipe, self.scale, pushes)
+        result = self.chain.train("sain", self.training, recipe, name=name)
         tuned = replace(
             load_model(str(result.folder)), id=ModelId(kind="sain", name="sain-tuned")
         )

@@ -11,11 +11,10 @@ from typing import Any
 from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig, Setup
 from sainet.datasets.store import Store
-from sainet.learning.config import FitConfig
+from sainet.learning.recipes import FINE_TUNING, PAPER, FromModel, Recipe
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.few_pushes import recipe
-from sainet.studies.trainings import Training
+from sainet.studies.trainings import Training, scaled
 
 AROUND = {
     "sain-bullet": "bullet",
@@ -94,10 +93,11 @@ class PaperSetup:
             changes: settings of the training that are not the paper's.
         """
         count = self.sizes.pushes if pushes is None else pushes
-        usual = FitConfig(iterations=self.sizes.iterations, batch_size=min(100, count))
-        store, config = self.training_pushes().first(count), replace(usual, **changes)
+        size = min(PAPER.optimiser.batch_size, count)
+        usual = PAPER.changed(iterations=self.sizes.iterations, batch_size=size)
+        store, recipe = self.training_pushes().first(count), usual.changed(**changes)
         return self.chain.train_seeds(
-            {name: self._training(name, store, config, form) for name in names}, seeds
+            {name: self._training(name, store, recipe, form) for name in names}, seeds
         )
 
     def train_beside_bystander(
@@ -109,21 +109,19 @@ class PaperSetup:
         which are those that the network was trained on.
         """
         store = self.training_pushes_with_bystander()
-        changes = {"steps": FitConfig.steps}
+        usual = FINE_TUNING.changed(steps=PAPER.horizon.steps)
+        usual = scaled(usual, self.scale, store.info.pushes)
         trainings = {}
         for name in names:
-            config = recipe(name, self.scale, store.info.pushes, changes)
-            training = self._training(name, store, config, BYSTANDER)
-            trainings[name] = replace(training, start_from=str(self.chain.out / name))
+            recipe = usual.changed(start=FromModel(str(self.chain.out / name)))
+            trainings[name] = self._training(name, store, recipe, BYSTANDER)
         return self.chain.train_seeds(trainings, seeds)
 
-    def _training(
-        self, name: str, store: Store, config: FitConfig, form: str
-    ) -> Training:
+    def _training(self, name: str, store: Store, recipe: Recipe, form: str) -> Training:
         return Training(
             "in" if name == "in" else "sain",
             store,
-            config,
+            recipe,
             self.chain.out / with_form(name, form),
             AROUND.get(name, "planar"),
         )

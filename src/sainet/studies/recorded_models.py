@@ -11,7 +11,14 @@ from jaxtyping import Int
 
 from sainet.datasets.store import Store
 from sainet.identification.identify import identify_into
-from sainet.learning.config import FROM_ENGINE, Features, ModelKind
+from sainet.learning.recipes import (
+    FINE_TUNING,
+    RESIDUAL,
+    Features,
+    Fresh,
+    FromModel,
+    ModelKind,
+)
 from sainet.models.camera import with_camera
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
@@ -21,7 +28,7 @@ from sainet.models.library import load_model, network_folder
 from sainet.models.model import Model
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.few_pushes import recipe
+from sainet.studies.trainings import scaled
 
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
@@ -91,15 +98,17 @@ class Tuner:
         if variant.learned == "simulation":
             found = load_model(strokes)
             return self._around_identified(found) if is_identified else found
-        start = {"tuned": strokes, "residual": FROM_ENGINE}.get(variant.learned)
-        pushes, seen = self.training.info.pushes, {"features": variant.features}
+        recipe = {
+            "tuned": FINE_TUNING.changed(start=FromModel(strokes)),
+            "residual": RESIDUAL,
+            "real": FINE_TUNING.changed(start=Fresh()),
+        }[variant.learned].changed(features=variant.features)
         result = self.chain.train(
             variant.network,
             self.training,
-            recipe(start, self.scale, pushes, seen),
+            scaled(recipe, self.scale, self.training.info.pushes),
             name=f"{self.folder}/{variant.name}",
             assumed_engine=str(self._identified()) if is_identified else "planar",
-            start_from=start,
         )
         return load_model(str(result.folder))
 

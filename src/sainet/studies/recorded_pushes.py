@@ -19,7 +19,7 @@ from sainet.evaluation.evaluate import Evaluation
 from sainet.evaluation.folds import join_folds
 from sainet.evaluation.offsets import EndOffsets, end_offsets
 from sainet.evaluation.rows import comparison_rows
-from sainet.learning.config import Features, ModelKind
+from sainet.learning.recipes import Features, ModelKind
 from sainet.report.figures.engine_errors import draw_engine_errors
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale

@@ -6,6 +6,7 @@ from the true state, in prediction from the predicted one.
 
 from typing import Any
 
+from sainet.learning.recipes import SingleSteps
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.paper_setup import paper_setup, with_form
@@ -19,7 +20,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     """Train IN and SAIN both ways on the robot setup; returns the table."""
     setup = paper_setup("robot", scale, chain)
     trainings = setup.train(NETWORKS, SEEDS[scale])
-    single = setup.train(NETWORKS, SEEDS[scale], form=SINGLE, recurrent=False)
+    single = setup.train(NETWORKS, SEEDS[scale], form=SINGLE, horizon=SingleSteps())
     trainings |= {with_form(name, SINGLE): single[name] for name in NETWORKS}
     table = setup.compare(trainings, setup.test_pushes())
     return chain.finish(table)

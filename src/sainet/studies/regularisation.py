@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from sainet.learning.config import FitConfig
+from sainet.learning.recipes import PAPER
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.paper_setup import join, paper_setup
@@ -27,7 +27,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     validation = setup.validation_pushes()
     tables, choices = [], []
     for l2 in CHOICES:
-        form = "" if l2 == FitConfig.l2 else f"l2-{l2:g}"
+        form = "" if l2 == PAPER.objective.l2 else f"l2-{l2:g}"
         trainings = setup.train(NETWORKS, SEEDS, form=form, l2=l2)
         table = setup.compare(trainings, validation, group=f"l2 {l2:g}")
         choices.append({"l2": l2, "score": score(table)})

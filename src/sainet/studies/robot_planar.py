@@ -6,7 +6,7 @@ The paper's Table III has Bullet for both; this is the same table on the base in
 from typing import Any
 
 from sainet.datasets.config import GenerateConfig
-from sainet.learning.config import FitConfig, ModelKind
+from sainet.learning.recipes import PAPER, ModelKind
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.published import ROBOT_TWO_DISKS, published_rows
@@ -28,9 +28,9 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     pushes, tests, iterations = _SIZES[scale]
     train = chain.simulate("train", GenerateConfig(pushes=pushes))
     test = chain.simulate("test", GenerateConfig(pushes=tests, seed=1))
-    config = FitConfig(iterations=iterations)
+    recipe = PAPER.changed(iterations=iterations)
     trainings = {
-        str(model): Training(model, train, config, chain.out / model)
+        str(model): Training(model, train, recipe, chain.out / model)
         for model in _MODELS
     }
     made = chain.train_seeds(trainings, _SEEDS[scale])

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
-from sainet.learning.config import FitConfig, ModelKind
+from sainet.learning.recipes import PAPER, FromModel, ModelKind
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.worlds.noise_config import NoiseConfig
@@ -34,8 +34,8 @@ STROKES = GenerateConfig(
     hold_steps=40,
     noise=NoiseConfig(tracking_mm=0.0),
 )
-RECIPE = FitConfig(iterations=3000, batch_size=50, halve_every=750, steps=10_000)
-SIZES = {"quick": (20, 20), "paper": (STROKES.pushes, RECIPE.iterations)}
+RECIPE = PAPER.changed(iterations=3000, batch_size=50, halve_every=750, steps=10_000)
+SIZES = {"quick": (20, 20), "paper": (STROKES.pushes, RECIPE.optimiser.iterations)}
 START_FROM: dict[str, ModelKind] = {"in-stroke": "in", "sain-stroke": "sain"}
 
 
@@ -58,10 +58,9 @@ class StrokeSetup:
         Args:
             name: `in-stroke` or `sain-stroke`.
         """
-        start = START_FROM[name]
-        config = replace(RECIPE, iterations=SIZES[self.scale][1])
-        pushes = self.training_pushes()
-        self.chain.train(start, pushes, config, name=name, start_from=start)
+        start, iterations = START_FROM[name], SIZES[self.scale][1]
+        recipe = RECIPE.changed(start=FromModel(start), iterations=iterations)
+        self.chain.train(start, self.training_pushes(), recipe, name=name)
         return name
 
 

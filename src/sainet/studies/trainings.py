@@ -11,13 +11,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sainet.datasets.store import Store
-from sainet.learning.config import FitConfig, ModelKind
 from sainet.learning.fit import FitResult, fit
 from sainet.learning.log import read_log
+from sainet.learning.recipes import FromModel, ModelKind, Recipe
 from sainet.models.card import CARD
 from sainet.runs.workers import worker_lost
+from sainet.studies.config import Scale
 
 _LOOK_AGAIN = 1.0  # s
+_QUICK_ITERATIONS = 20
 
 
 @dataclass(frozen=True)
@@ -26,15 +28,19 @@ class Training:
 
     model: ModelKind
     store: Store
-    config: FitConfig
+    recipe: Recipe
     out: Path
     assumed_engine: str = "planar"
-    start_from: str | None = None
 
     @property
     def name(self) -> str:
         """The name of its folder."""
         return self.out.name
+
+    @property
+    def iterations(self) -> int:
+        """The number of its iterations."""
+        return self.recipe.optimiser.iterations
 
     @property
     def is_finished(self) -> bool:
@@ -44,31 +50,36 @@ class Training:
     def of_seeds(self, seeds: Sequence[int]) -> list["Training"]:
         """Return a training for each seed, with a folder of its own.
 
-        Each goes on from the network of its own seed, if from any.
+        A training that starts from a network starts from that of its own seed.
         """
-        return [
-            replace(
-                self,
-                config=replace(self.config, seed=seed),
-                out=self.out.with_name(of_seed(self.name, seed)),
-                start_from=self.start_from and of_seed(self.start_from, seed),
-            )
-            for seed in seeds
-        ]
+        return [self._of_seed(seed) for seed in seeds]
+
+    def _of_seed(self, seed: int) -> "Training":
+        recipe, out = self.recipe.changed(seed=seed), of_seed(self.name, seed)
+        if isinstance(recipe.start, FromModel):
+            start = FromModel(of_seed(recipe.start.model, seed))
+            recipe = recipe.changed(start=start)
+        return replace(self, recipe=recipe, out=self.out.with_name(out))
 
     def run(
-        self, on_step: Callable[[int, float], None] = lambda iteration, loss: None
+        self, on_step: Callable[[int, float | None], None] = lambda done, loss: None
     ) -> FitResult:
-        """Train the network, or go on; see `fit` for what is told and raised."""
+        """Train the network, or resume; see `fit` for `on_step` and errors."""
         return fit(
             self.model,
             self.store,
-            self.config,
+            self.recipe,
             self.out,
             assumed_engine=self.assumed_engine,
-            start_from=self.start_from,
             on_step=on_step,
         )
+
+
+def scaled(recipe: Recipe, scale: Scale, pushes: int) -> Recipe:
+    """Return a recipe for so many pushes: the quick scale has a few iterations."""
+    size = min(recipe.optimiser.batch_size, pushes)
+    quick = {"iterations": _QUICK_ITERATIONS} if scale == "quick" else {}
+    return recipe.changed(batch_size=size, **quick)
 
 
 def of_seed(name: str, seed: int) -> str:
@@ -119,7 +130,7 @@ def _look(futures: dict[Future[None], Training]) -> tuple[int, str]:
     total, losses = 0, []
     for future, training in futures.items():
         if future.done():
-            total += training.config.iterations  # all it will make
+            total += training.iterations
         elif lines := read_log(training.out):
             total += int(lines[-1]["iteration"])
             losses.append(f"{lines[-1]['loss']:.3g}")

@@ -1,0 +1,104 @@
+"""`sainet tune`."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from tyro.conf import Positional
+
+from sainet.cli.output import Output
+from sainet.cli.train import Job
+from sainet.learning.recipes import (
+    FROM_ENGINE,
+    RESIDUAL,
+    Features,
+    ModelKind,
+    recipe_for,
+    start_named,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changes:
+    """Settings that differ from the recipe of the start."""
+
+    iterations: int | None = None
+    """Gradient steps (default: 1,200 from the engine, 300 from a network)."""
+    halve_every: int | None = None
+    """Iterations between two halvings of the learning rate (default: 800 from the
+    engine, 200 from a network)."""
+    l2: float | None = None
+    """Weight of the squared changes of the weights in the loss: a smaller one allows
+    larger changes (default: 1 / pushes from the engine, 0.001 from a network)."""
+    weight_rotation: float | None = None
+    """Weight of rotations in the scaled loss (default: 2 from the engine, 1 from a
+    network)."""
+    batch_size: int = RESIDUAL.optimiser.batch_size
+    """Pushes per gradient step."""
+    learning_rate: float = RESIDUAL.optimiser.learning_rate
+    """Initial Adam learning rate."""
+    average: int = RESIDUAL.optimiser.average
+    """Span of the exponential mean of the weights (iterations); 0: the last weights."""
+    linear_from: float = RESIDUAL.objective.linear_from
+    """Scaled error of a push above which the loss grows linearly, so that failed
+    recordings do not dominate; 0: squared everywhere."""
+    steps: int = RESIDUAL.horizon.steps
+    """Steps of each push to train on, at most."""
+    hold: int = RESIDUAL.horizon.hold
+    """Zero-order-hold length for additive networks in training (steps)."""
+    mirror: bool = RESIDUAL.augmentation.mirror
+    """Do not mirror pushes. By default, about half of each batch is mirrored (not with
+    the features 'place')."""
+    validation_share: float = RESIDUAL.stopping.validation_share
+    """Share of the pushes kept for validation; training then ends with the network that
+    was best on them."""
+    patience: int = RESIDUAL.stopping.patience
+    """Iterations without a better validation loss after which training stops; 0: all
+    iterations."""
+    features: Features = RESIDUAL.features
+    """Features of the network. place: the place on the table and the absolute angle
+    too, for pushes at one place of one table."""
+    seed: int = RESIDUAL.seed
+    """Random seed."""
+    log_every: int = RESIDUAL.log_every
+    """Iterations between two lines of the log."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tune:
+    """Train a network on few pushes, around an engine or from an existing network."""
+
+    model: Positional[ModelKind]
+    """Network: in (without an engine) or sain (around an engine)."""
+    data: Path
+    """Dataset to train on."""
+    out: Path
+    """Run folder; identical settings resume."""
+    start: str = FROM_ENGINE
+    """Start of training. engine: a network that adds to the motion of the internal
+    engine, at first nothing. Otherwise a shipped network, or the folder of a trained
+    one."""
+    engine: str = "planar"
+    """Internal engine of SAIN: the folder of identified parameters ('sainet identify'),
+    or a simulator whose prediction the dataset contains."""
+    group: str | None = None
+    """Group of pushes to train on (default: all groups)."""
+    pushes: int | None = None
+    """Pushes to train on, from the start of the dataset (default: all)."""
+    changes: Changes = field(default_factory=Changes)
+    devices: int | None = None
+    """CPU devices to split each batch over (default: one per core)."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> dict[str, Any]:
+        """Train the network and draw its learning curve."""
+        given = {k: v for k, v in asdict(self.changes).items() if v is not None}
+        recipe = recipe_for(start_named(self.start)).changed(**given)
+        return Job(
+            self.model,
+            self.data,
+            self.out,
+            self.engine,
+            group=self.group,
+            pushes=self.pushes,
+        ).run(recipe, self.devices, self.output)

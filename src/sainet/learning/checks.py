@@ -1,0 +1,107 @@
+"""Checks that a training job can run, before its folder is made."""
+
+from sainet.engines.simulator import PlanarSpec, SimulatorSpec
+from sainet.learning.recipes import FROM_ENGINE
+from sainet.learning.task import Existing, Task
+from sainet.models.card import CARD
+from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
+
+
+def check_task(task: Task) -> None:
+    """Check that the data suffice and that training can start from its network.
+
+    Raises:
+        BadStore: the data lack inputs of the network.
+        BadInput: the recipe does not fit the model or the data.
+        BadCheckpoint: training cannot start from that network.
+    """
+    path = task.store.path
+    _check_simulator(task)
+    if task.is_additive and task.inner is None:
+        raise BadInput(
+            f"`start` is {FROM_ENGINE}; {task.model} has no internal engine: train "
+            "sain, or give `start` a network."
+        )
+    share = task.recipe.stopping.validation_share
+    if share and task.validation is None:
+        raise BadInput(
+            f"`validation_share` is {share}; {path} has no two pushes that are not "
+            "repeats of each other."
+        )
+    if task.existing:
+        _check_existing(task, task.existing)
+    if task.has_single_steps:
+        _check_single_steps(task)
+
+
+def _check_simulator(task: Task) -> None:
+    info, path, simulator = task.store.info, task.store.path, task.assumed.simulator
+    if not simulator.is_identified and simulator.slug not in info.assumed_engines:
+        raise BadStore(
+            f"{path}: no simulator prediction of {simulator.slug}; use "
+            f"{' or '.join(info.assumed_engines)}, or the folder of identified "
+            "parameters."
+        )
+    if simulator.is_identified and info.kind != "robot":
+        raise BadStore(
+            f"{path}: kind is {info.kind!r}; an identified engine predicts pushes of "
+            "the robot setup."
+        )
+
+
+def _check_existing(task: Task, existing: Existing) -> None:
+    info, card, path = task.store.info, existing.card, existing.folder / CARD
+    pairs = {
+        "kind": (card.kind, info.kind),
+        "time_step": (card.time_step, info.time_step),
+        "recurrent": (card.recurrent, not task.has_single_steps),
+        "identity.kind": (card.identity.kind, task.model),
+    }
+    for name, (found, wanted) in pairs.items():
+        if found != wanted:
+            raise BadCheckpoint(
+                f"{path}: {name} is {found!r}, this training's is {wanted!r}; give "
+                "`start` another network."
+            )
+    _check_internal_engine(task, existing)
+    if card.identity.features == "place" and not task.features.has_place:
+        raise BadCheckpoint(f"{path}: features is 'place'; give `features` place, too.")
+
+
+def _check_internal_engine(task: Task, existing: Existing) -> None:
+    """Raise `BadCheckpoint` if the network was trained around too different an engine.
+
+    An identified engine is the planar one with other parameters: training around it may
+    start from a network that was trained around the planar engine.
+    """
+    found = existing.card.identity.simulator
+    wanted = task.inner.simulator if task.inner else None
+    if found == wanted or (_is_planar_like(found) and _is_identified(wanted)):
+        return
+    names = [spec.slug if spec else None for spec in (found, wanted)]
+    raise BadCheckpoint(
+        f"{existing.folder / CARD}: the internal engine is {names[0]!r}, this "
+        f"training's is {names[1]!r}; give `start` another network."
+    )
+
+
+def _is_identified(spec: SimulatorSpec | None) -> bool:
+    return spec is not None and spec.is_identified
+
+
+def _is_planar_like(spec: SimulatorSpec | None) -> bool:
+    return spec == PlanarSpec() or _is_identified(spec)
+
+
+def _check_single_steps(task: Task) -> None:
+    info, path = task.store.info, task.store.path
+    if info.kind != "robot" or info.is_recorded:
+        raise BadStore(
+            f"{path}: single steps need simulated pushes of the robot setup, whose "
+            "state is known at every step; train on whole pushes."
+        )
+    if task.inner and task.inner.simulator.build().on_host:
+        raise BadInput(
+            f"`assumed_engine` is {task.inner.simulator.slug}, which cannot restart at "
+            "every step of a training; use planar, or train on whole pushes."
+        )
