@@ -179,7 +179,7 @@ def _recorded_pushes() -> str:
         "direction, so that repeats never straddle; a model of its own for each "
         "surface, unless its name says `for-all`. Intervals are over folds and pushes. "
         "`tuned`: from the network of simulated strokes; `residual`: added to the "
-        "engine, nothing at first, these pushes alone (`--start-from engine`); `real`: "
+        "engine, nothing at first, these pushes alone (`--start engine`); `real`: "
         "these pushes alone, in the paper's form; "
         "`identified`: around the engine identified on the same training pushes; "
         "`place`: sees where on the table it is. The settings of `residual` are what "

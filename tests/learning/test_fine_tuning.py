@@ -287,7 +287,7 @@ def test_invalid_starting_networks_are_refused(store, start, tmp_path):
     with pytest.raises(BadCheckpoint, match="kind is 'in', this training's is 'sain'"):
         fit("sain", store, starting(TUNING, start / "in"), out)
     for name in ("nowhere", "physics"):
-        says = f"--start-from is '{name}'; it must be engine, in, sain, .*folder"
+        says = f"`start` is '{name}'; it must be engine, in, sain, .*folder"
         with pytest.raises(UnknownName, match=says):
             fit("in", store, starting(TUNING, name), out)
     assert not out.exists()
