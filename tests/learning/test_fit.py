@@ -234,7 +234,7 @@ def test_a_loss_of_nan_stops_the_training(store, tmp_path, monkeypatch):
 
 
 def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
-    says = "assumed_engines has no 'bullet'; give `assumed_engine` planar, which"
+    says = "no simulator prediction of bullet; use planar, or the folder"
     with pytest.raises(BadStore, match=says):
         fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
     assert not (tmp_path / "out").exists()
