@@ -9,9 +9,10 @@ from sainet.cli.output import Output
 
 @dataclass(frozen=True, kw_only=True)
 class Split:
-    """Divide a dataset into training pushes and test pushes.
+    """Divide recorded pushes into training pushes and test pushes.
 
-    Repeats stay together. Train on OUT/train, evaluate on OUT/test.
+    Repeats stay together. Train on OUT/train, evaluate on OUT/test. For simulated
+    pushes generate a test dataset with another seed instead.
     """
 
     data: Path
