@@ -44,10 +44,12 @@ def test_without_arguments_the_help_is_printed():
     ("words", "names"),
     [
         (("generate", "robot", "--pushes", "0"), ("--pushes", "at least 1")),
-        (("generate", "robot", "--radius-mm", "-1"), ("--radius-mm", "positive")),
-        (("generate", "robot", "--mass-kg", "nan"), ("--mass-kg", "positive")),
-        (("generate", "robot", "--gap-mm", "-2"), ("--gap-mm", "overlap")),
+        (("generate", "robot", "--radius-mm", "-1"), ("--radius-mm", "from 1")),
+        (("generate", "robot", "--mass-kg", "nan"), ("--mass-kg", "nan")),
+        (("generate", "robot", "--gap-mm", "-2"), ("--gap-mm", "from 0")),
         (("generate", "robot", "--workers", "0"), ("--workers", "at least 1")),
+        (("generate", "robot", "--disks", "1000000"), ("--disks", "from 1 to 100")),
+        (("generate", "robot", "--engine", "planer"), ("--engine", "mean planar?")),
         (("reproduce", "--trainers", "0"), ("--trainers", "at least 1")),
     ],
 )
@@ -86,8 +88,9 @@ def test_missing_inputs_are_named(tmp_path, monkeypatch, words, names):
 def test_an_impossible_path_gives_one_line(words):
     path = "x" * 300
     error = sainet(*(word.format(path) for word in words), status=2).stderr
-    assert error.startswith(f"sainet: {path}")
+    assert error.startswith("sainet: xxx")
     assert len(error.splitlines()) == 1
+    assert len(error) < 320
     assert "File name too long" in error
 
 

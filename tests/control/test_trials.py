@@ -252,7 +252,7 @@ def test_the_stopping_tolerance_may_be_below_the_tolerance(tmp_path, monkeypatch
         ({"model": "nothing"}, UnknownName, "nothing"),
         ({"planner": "cem"}, UnknownName, "greedy"),
         ({"world": "havok"}, UnknownName, "planar"),
-        ({"deadline": 1.0}, BadInput, "--deadline"),
+        ({"deadline": 1.0}, BadInput, "`deadline`"),
     ],
 )
 def test_impossible_settings_are_refused_before_any_output(
@@ -278,8 +278,8 @@ def test_a_network_for_other_controls_is_refused(tmp_path):
         *(("deadline", math.inf), ("alignment", math.inf), ("alignment", math.nan)),
     ],
 )
-def test_bad_settings_name_their_option(name, value):
-    with pytest.raises(BadInput, match=f"^`{name}` is {value}"):
+def test_bad_settings_are_named(name, value):
+    with pytest.raises(BadInput, match=f"^`{name}` is {value:g}"):
         ControlConfig(**{name: value})
 
 

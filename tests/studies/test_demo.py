@@ -77,7 +77,7 @@ def begun(monkeypatch):
     ("second", "error", "says"),
     [
         ("table-9", UnknownName, "table-9"),
-        ("recorded-pushes", BadInput, "--recorded is missing"),
+        ("recorded-pushes", BadInput, "`recorded` is missing"),
         ("engine-parity", MissingExtra, "PyBullet"),
     ],
 )

@@ -1,0 +1,46 @@
+"""Errors of the library become one line of the command line, with its options."""
+
+import pickle
+
+import pytest
+
+from sainet.cli.generate import Generate
+from sainet.cli.messages import message
+from sainet.cli.train import Train
+from sainet.runs.errors import BadInput, BadSetting, unknown_name
+
+
+def test_settings_become_options_of_the_command():
+    error = BadSetting("chunk_size", 0, "at least 1")
+    assert str(error) == "`chunk_size` is 0; it must be at least 1."
+    assert message(error, Generate) == "--chunk-size is 0; it must be at least 1."
+    nested = BadInput("reduce `tracking_mm` or choose another `out`")
+    assert message(nested, Generate) == "reduce --tracking-mm or choose another --out"
+
+
+def test_what_is_no_option_stays_a_name():
+    error = BadInput("`model` and `chunk_size` are wrong")  # `model` is positional
+    assert message(error, Train) == str(error)
+    assert message(error) == str(error)
+
+
+def test_settings_cross_processes():
+    error = pickle.loads(pickle.dumps(BadSetting("pushes", 0, "at least 1")))
+    assert str(error) == "`pushes` is 0; it must be at least 1."
+
+
+@pytest.mark.parametrize(
+    "text", ["x" * 5000, "a\nb\tc", "\ud800", "\x1b[31m", "[" * 999]
+)
+def test_any_message_is_one_printable_line(text):
+    shown = message(BadInput(f"file: {text}; remedy"))
+    assert shown.isprintable()
+    assert len(shown) <= 300
+    assert shown.startswith("file: ") and shown.endswith("remedy")
+
+
+def test_unknown_names_suggest_the_nearest():
+    error = unknown_name("model", "saim", ["in", "sain"])
+    assert str(error) == (
+        "No model named 'saim' (did you mean sain?). Available: in, sain."
+    )
