@@ -1,10 +1,10 @@
 """Bystanders, compared with an engine on the same scene."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
@@ -69,7 +69,7 @@ def test_the_true_engine_does_not_move_the_bystander(wider):
 
 def test_the_pushes_are_unchanged(store, wider):
     before, after = store.read(slice(None)), wider.read(slice(None))
-    assert wider.info == replace(store.info, bodies=3)
+    assert wider.info == structs.replace(store.info, bodies=3)
     for name, variable in variables(store.info).items():
         if name.startswith("simulated_"):
             continue

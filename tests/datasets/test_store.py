@@ -6,12 +6,13 @@ import shutil
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from sainet.datasets.schema import StoreInfo, variables
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.runs.documents import content_hash
-from sainet.runs.errors import BadStore
+from sainet.runs.errors import BadInput, BadStore
 
 CHUNK = "pushes.zarr/truth/c/1/0/0/0"
 ATTRIBUTES = "pushes.zarr/zarr.json"
@@ -89,7 +90,10 @@ def test_an_invalid_list_of_hashes_is_refused(copy, text):
     assert "hashes.json" in refusal(copy)
 
 
-@pytest.mark.parametrize("files", [None, [], {}, {"zarr.json": 3}, {"zarr.json": None}])
+@pytest.mark.parametrize(
+    "files",
+    [None, [], {}, {"zarr.json": 3}, {"zarr.json": None}, {"/dev/zero": "0" * 64}],
+)
 def test_a_damaged_list_of_hashes_is_refused(copy, files):
     edit(copy / "hashes.json", lambda found: found.update(files=files))
     refusal(copy)
@@ -102,9 +106,9 @@ def test_a_chunk_without_a_hash_is_named(copy):
 
 
 def test_a_newer_store_asks_for_a_newer_sainet(copy):
-    edit(copy / "hashes.json", lambda found: found.update(format_version=2))
+    edit(copy / "hashes.json", lambda found: found.update(format_version=3))
     message = refusal(copy)
-    assert "format_version is 2" in message
+    assert "format_version is 3" in message
     assert "upgrade" in message
 
 
@@ -113,23 +117,32 @@ def test_newer_attributes_ask_for_a_newer_sainet(copy):
     assert "format_version is 7" in refusal(copy)
 
 
+def test_an_earlier_format_is_one_clear_line(copy):
+    edit(copy / "hashes.json", lambda found: found.update(format_version=1))
+    message = refusal(copy)
+    assert message == (
+        f"{copy / 'hashes.json'}: format_version is 1, not 2: it was made by an "
+        "earlier version of sainet; make it again."
+    )
+
+
 @pytest.mark.parametrize("version", [None, "1", 0, -1, 1.5, [1]])
 def test_an_unknown_version_is_refused(copy, version):
     edit(copy / "hashes.json", lambda found: found.update(format_version=version))
-    assert "format_version is" in refusal(copy)
+    assert "format_version" in refusal(copy)
 
 
 @pytest.mark.parametrize("attributes", [[], None, 3])
 def test_invalid_attributes_are_refused(copy, attributes):
     edit(copy / ATTRIBUTES, lambda found: found.update(attributes=attributes))
-    assert f"{ATTRIBUTES}: attributes are missing" in refusal(copy)
+    assert f"{ATTRIBUTES}: attributes: expected" in refusal(copy)
 
 
-@pytest.mark.parametrize("name", ["kind", "pushes", "time_step", "seed"])
+@pytest.mark.parametrize("name", ["kind", "pushes", "time_step", "engine"])
 def test_a_missing_attribute_is_named(copy, name):
     edit_attributes(copy, lambda found: found.pop(name))
     message = refusal(copy)
-    assert f"{name} is missing" in message
+    assert f"missing required field `{name}`" in message
     assert ATTRIBUTES in message
 
 
@@ -150,6 +163,14 @@ def test_attributes_that_contradict_the_arrays_are_refused(copy, damage):
         {"chunk_size": 0},
         {"time_step": -1.0},
         {"assumed_engines": 5},
+        {"assumed_engines": ["../../planar"]},
+        {"steps": 10**9},
+        {"steps": -(2**31)},
+        {"pushes": 10**30},
+        {"time_step": 1e-46},
+        {"seed": -1},
+        {"damping": -1.0},
+        {"groups": [""]},
     ],
 )
 def test_impossible_attributes_are_refused(copy, damage):
@@ -198,6 +219,153 @@ def test_repeats_default_to_unique(copy):
     assert store.repeats().tolist() == list(range(store.info.pushes))
 
 
+def rehash(folder):
+    """Makes the list of hashes agree with the files: damage that hashes do not show."""
+    arrays = folder / "pushes.zarr"
+
+    def hashed(found):
+        for name in found["files"]:
+            found["files"][name] = content_hash((arrays / name).read_bytes())
+
+    edit(folder / "hashes.json", hashed)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"shape": [28, 10**9, 2, 6]},
+        {"shape": [28, -1, 2, 6]},
+        {"data_type": "float64"},
+        {"data_type": 3},
+        {"codecs": [{"name": "bytes"}]},
+        {
+            "codecs": [
+                {"name": "bytes"},
+                {"name": "gzip", "configuration": {"level": 1}},
+            ]
+        },
+        {"codecs": "zstd"},
+        {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [1]}}},
+        {"chunk_key_encoding": {"name": "v2"}},
+        {"fill_value": [1]},
+        {"dimension_names": ["push"]},
+        {"zarr_format": 2},
+        {"node_type": "group"},
+    ],
+)
+def test_metadata_that_the_writer_does_not_write_are_refused(copy, change):
+    edit(copy / "pushes.zarr/truth/zarr.json", lambda found: found.update(change))
+    rehash(copy)
+    assert "pushes.zarr/truth" in refusal(copy)
+
+
+def cut(data: bytes) -> bytes:
+    return data[: len(data) // 2]
+
+
+DAMAGE = {
+    "doubled": lambda data: data + data,
+    "cut": cut,
+    "empty": lambda data: b"",
+    "zeros": lambda data: bytes(len(data)),
+    "flipped": lambda data: data[:40] + bytes([data[40] ^ 255]) + data[41:],
+    # A frame that declares terabytes.
+    "bomb": lambda data: data[:4] + b"\xe0" + b"\xff" * 8 + data[9:],
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damaged_chunks_with_matching_hashes_are_one_line(copy, damage):
+    before = (copy / CHUNK).read_bytes()
+    (copy / CHUNK).write_bytes(DAMAGE[damage](before))
+    rehash(copy)
+    try:
+        open_store(copy).read(slice(None))
+    except BadStore as error:
+        assert "pushes.zarr/truth" in str(error) and "\n" not in str(error)
+    else:  # nothing else was read than what was written
+        assert damage in ("doubled", "flipped")
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "../../../etc/passwd", "truth/other"])
+def test_the_list_of_hashes_names_files_of_the_dataset_only(copy, name):
+    edit(copy / "hashes.json", lambda found: found["files"].update({name: "0" * 64}))
+    assert "is no file of this dataset" in refusal(copy)
+
+
+@pytest.mark.parametrize("name", [CHUNK, ATTRIBUTES, "hashes.json"])
+def test_pipes_and_devices_are_refused_at_once(copy, name):
+    (copy / name).unlink()
+    os.mkfifo(copy / name)
+    assert "not a regular file" in refusal(copy)
+    (copy / name).unlink()
+    os.symlink("/dev/zero", copy / name)
+    assert "not a regular file" in refusal(copy)
+
+
+BAD_VALUES = [
+    ("mass", -1.0, "mass is -1"),
+    ("mass", np.nan, "mass is nan"),
+    ("radius", 0.0, "radius is 0"),
+    ("radius", 55.0, "radius is 55"),
+    ("pusher_radius", -0.0048, "pusher radius is"),
+    ("table_friction", -0.1, "friction is -0.1"),
+    ("disk_friction", 1e30, "friction is 1e+30"),
+    ("steps", -1, "steps is -1"),
+    ("steps", 10**9, "steps is 1e+09"),
+    ("group", 7, "group is 7"),
+    ("truth", np.nan, "position is nan"),
+    ("truth", 1e30, "position is 1e+30"),
+    ("truth_pusher", np.inf, "position is inf"),
+    ("measured", np.nan, "position is nan"),
+    ("initial", np.nan, "position is nan"),
+    ("simulated_planar", np.nan, "position is nan"),
+    ("command_velocity", 1e10, "velocity is 1e+10"),
+    ("pose_observed", 7, "flag is 7"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "says"), BAD_VALUES)
+def test_impossible_values_name_array_push_and_value(
+    whole_store, tmp_path, name, value, says
+):
+    store = open_store(whole_store)
+    arrays = store.read(slice(None))
+    arrays[name][(3, *[0] * (arrays[name].ndim - 1))] = value
+    write_store(tmp_path / "bad", store.info, arrays)
+    bad = open_store(tmp_path / "bad")
+    with pytest.raises(BadStore) as refused:
+        bad.read(slice(2, 9), (name,))
+    assert f"pushes.zarr/{name}: push 3: {says}" in str(refused.value)
+    assert "delete" in str(refused.value) and "\n" not in str(refused.value)
+    with pytest.raises(BadStore, match="push 3: "):
+        bad.take([9, 3, 0]).read(slice(None), (name,))
+    bad.read(slice(4, 9), (name,))
+
+
+def test_what_was_not_observed_may_be_unknown(whole_store, tmp_path):
+    store = open_store(whole_store)
+    arrays = store.read(slice(None))
+    arrays["rate_observed"][3] = 0
+    arrays["truth"][3, ..., 3:] = np.nan
+    arrays["truth"][4, 30:] = np.nan
+    arrays["steps"][4] = 30
+    write_store(tmp_path / "store", store.info, arrays)
+    found = open_store(tmp_path / "store").read(slice(None), ("truth",))["truth"]
+    np.testing.assert_array_equal(found, arrays["truth"])
+    arrays["steps"][4] = 31
+    write_store(tmp_path / "other", store.info, arrays)
+    with pytest.raises(BadStore, match="truth: push 4: position is nan"):
+        open_store(tmp_path / "other").read(slice(None), ("truth",))
+
+
+def test_properties_out_of_range_are_not_written(whole_store, tmp_path):
+    store = open_store(whole_store)
+    info = structs.replace(store.info, time_step=-1.0)
+    with pytest.raises(BadInput, match="time_step: expected"):
+        write_store(tmp_path / "store", info, store.read(slice(None)))
+
+
 def test_a_store_in_memory_is_written_and_read_back(tmp_path):
     info = StoreInfo(
         kind="robot",
@@ -214,12 +382,13 @@ def test_a_store_in_memory_is_written_and_read_back(tmp_path):
     rng = np.random.default_rng(0)
     sizes = {"push": 5, "time": 4, "body": 1, "motion": 6, "pose": 3, "xy": 2}
     arrays = {
-        name: rng.normal(size=[sizes[d] for d in variable.dimensions]).astype(
+        name: rng.uniform(0.1, 0.9, [sizes[d] for d in variable.dimensions]).astype(
             variable.dtype
         )
         for name, variable in variables(info).items()
     }
-    arrays["truth"][1] = np.nan
+    arrays["steps"] += 4
+    arrays["truth"][1] = np.nan  # no flag claims that it was observed
     write_store(tmp_path / "store", info, arrays)
     store = open_store(tmp_path / "store")
     assert store.info == info

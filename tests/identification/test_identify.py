@@ -7,6 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 
 from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
@@ -73,7 +74,7 @@ def store(tmp_path_factory):
     seen["measured"] = np.where(
         seen["pose_observed"][..., None, None], motion[..., :3], np.nan
     )
-    info = replace(info, engine="recorded")
+    info = structs.replace(info, engine="recorded")
     (folder / "data").mkdir()
     write_store(folder / "data", info, seen)
     return open_store(folder / "data")

@@ -9,12 +9,12 @@ with assumed radii the disks may overlap.
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
+from msgspec import structs
 
 from sainet.datasets.derive import derive
 from sainet.datasets.predictions import simulate
@@ -101,12 +101,12 @@ def with_bystander(
         "measured": rest[:, None, None, :3],
     }
     found = {}
-    for name, variable in variables(replace(info, assumed_engines=())).items():
+    for name, variable in variables(structs.replace(info, assumed_engines=())).items():
         array = arrays[name]
         if "body" in variable.dimensions:
             array = _append(array, known.get(name), variable.dimensions.index("body"))
         found[name] = array
-    wider = replace(info, pushes=pushes, bodies=info.bodies + 1)
+    wider = structs.replace(info, pushes=pushes, bodies=info.bodies + 1)
     for engine in info.assumed_engines:
         found[simulated_name(engine)] = _simulate(engine, found, wider, on_pushes)
     return found

@@ -1,9 +1,10 @@
 """Datasets derived from others: selected or modified pushes."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from msgspec import structs
 
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store, open_store
@@ -34,5 +35,7 @@ def derive(
     if not folder.is_finished:
         arrays = change(store.read(slice(None)))
         pushes, bodies = arrays["mass"].shape
-        write_store(out, replace(store.info, pushes=pushes, bodies=bodies), arrays)
+        write_store(
+            out, structs.replace(store.info, pushes=pushes, bodies=bodies), arrays
+        )
     return open_store(out)

@@ -2,31 +2,54 @@
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from sainet.datasets.schema import FORMAT_VERSION, Arrays, StoreInfo, sizes, variables
-from sainet.runs.documents import content_hash, read_json, write_error, write_json
+from sainet.datasets.schema import (
+    FORMAT_VERSION,
+    Arrays,
+    StoreInfo,
+    Variable,
+    chunk_shape,
+    sizes,
+    variables,
+)
+from sainet.runs.documents import (
+    checked,
+    content_hash,
+    read_document,
+    write_document,
+    write_error,
+)
+from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
 
 ARRAYS = "pushes.zarr"
 HASHES = "hashes.json"
 PROGRESS = "progress"
+Hashes = dict[str, str]  # SHA-256 by file, relative to the folder of the arrays
+
+
+class Listing(msgspec.Struct, frozen=True, kw_only=True):
+    """Hashes of the files of a dataset; written last, so it marks a whole dataset."""
+
+    files: Hashes
+    format_version: int = FORMAT_VERSION
 
 
 def create_arrays(folder: Path, info: StoreInfo) -> None:
     """Create the empty arrays of a store; repeated calls give the same bytes.
 
     Raises:
-        BadInput: the disk is full.
+        BadInput: the disk is full, or a property of the dataset is out of range.
     """
     import zarr
     from zarr.codecs import ZstdCodec
 
-    attributes = {"format_version": FORMAT_VERSION, **asdict(info)}
+    attributes = msgspec.to_builtins(checked(info, folder))
     try:
         group = zarr.open_group(folder / ARRAYS, mode="a", attributes=None)
         group.attrs.put(attributes)
@@ -37,7 +60,7 @@ def create_arrays(folder: Path, info: StoreInfo) -> None:
             group.create_array(
                 name,
                 shape=shape,
-                chunks=(min(info.chunk_size, info.pushes), *shape[1:]),
+                chunks=chunk_shape(info, variable),
                 dtype=variable.dtype,
                 fill_value=np.nan if variable.dtype is np.float32 else 0,
                 compressors=ZstdCodec(level=1),
@@ -75,15 +98,17 @@ def write_chunk(folder: Path, info: StoreInfo, index: int, arrays: dict) -> None
         name: content_hash((folder / ARRAYS / name).read_bytes())
         for name in chunk_files(info, index)
     }
-    write_json(_receipt(folder, index), hashes)
+    write_document(_receipt(folder, index), Listing(files=hashes))
 
 
 def chunk_files(info: StoreInfo, index: int) -> list[str]:
     """Return the files of one chunk, relative to the folder of the arrays."""
-    return [
-        "/".join([name, "c", str(index), *["0"] * (len(variable.dimensions) - 1)])
-        for name, variable in variables(info).items()
-    ]
+    return [chunk_file(name, each, index) for name, each in variables(info).items()]
+
+
+def chunk_file(name: str, variable: Variable, index: int) -> str:
+    """Return the file of one chunk of an array."""
+    return "/".join([name, "c", str(index), *["0"] * (len(variable.dimensions) - 1)])
 
 
 def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
@@ -94,16 +119,17 @@ def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
     """
     for leftover in (folder / ARRAYS).rglob("*.partial"):
         leftover.unlink(missing_ok=True)
-    return [i for i in range(info.chunks) if not _is_written(folder, i)]
+    return [i for i in range(info.chunks) if not _is_written(folder, info, i)]
 
 
-def _is_written(folder: Path, index: int) -> bool:
-    receipt = _receipt(folder, index)
-    if not receipt.is_file():
+def _is_written(folder: Path, info: StoreInfo, index: int) -> bool:
+    try:
+        receipt = read_document(_receipt(folder, index), Listing).files
+    except BadInput:
         return False
     return all(
-        _hash_or_none(folder / ARRAYS / name) == known
-        for name, known in read_json(receipt).items()
+        name in receipt and _hash_or_none(folder / ARRAYS / name) == receipt[name]
+        for name in chunk_files(info, index)
     )
 
 
@@ -116,14 +142,14 @@ def _receipt(folder: Path, index: int) -> Path:
 
 
 def finish(folder: Path, info: StoreInfo) -> None:
-    """Write the list of all hashes, which marks the store as complete."""
-    hashes: dict[str, str] = {}
+    """Write the list of all hashes, which completes the dataset."""
+    hashes: Hashes = {}
     for index in range(info.chunks):
-        hashes |= read_json(_receipt(folder, index))
+        hashes |= read_document(_receipt(folder, index), Listing).files
     for path in sorted((folder / ARRAYS).rglob("zarr.json")):
         name = path.relative_to(folder / ARRAYS).as_posix()
         hashes[name] = content_hash(path.read_bytes())
-    write_json(folder / HASHES, {"format_version": FORMAT_VERSION, "files": hashes})
+    write_document(folder / HASHES, Listing(files=hashes))
     clear_progress(folder)
 
 

@@ -1,4 +1,4 @@
-"""Documents on disk: JSON, hashes and atomic writes."""
+"""Documents on disk: typed JSON, hashes and atomic writes."""
 
 import errno
 import hashlib
@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, shown
 
 
 FORMAT_VERSION = 1
@@ -96,12 +96,9 @@ def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
         BadInput: or the given subclass, if the file is missing or not a JSON object.
     """
     try:
-        value = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:
-        raise error(f"{path}: no such file; was it made by sainet?") from None
-    except (OSError, ValueError, RecursionError) as cause:
-        reason = str(cause).splitlines()[0]
-        raise error(f"{path}: cannot be read as JSON ({reason}).") from None
+        value = msgspec.json.decode(read_file(path, error=error))
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
+        raise error(f"{path}: cannot be read as JSON ({_reason(cause)}).") from None
     if not isinstance(value, dict):
         raise error(f"{path}: must hold a JSON object, not a {type(value).__name__}.")
     return value
@@ -133,21 +130,23 @@ def read_file(
     """
     try:
         # Not blocking: to open a pipe would wait for a writer.
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
-        with open(descriptor, "rb") as file:
-            found = os.fstat(descriptor)
+        with open(path, "rb", opener=_open_at_once) as file:
+            found = os.fstat(file.fileno())
             if not stat.S_ISREG(found.st_mode):
                 raise error(f"{path}: not a regular file; give a file.")
-            if found.st_size > most:
-                raise error(
-                    f"{path}: {found.st_size} bytes; at most {most} are read."
-                )
-            return file.read(most)
+            data = file.read(most + 1)
     except FileNotFoundError:
         raise error(f"{path}: no such file.") from None
     except (OSError, ValueError) as cause:
         reason = getattr(cause, "strerror", None) or cause
         raise error(f"{path}: cannot be read ({reason}).") from None
+    if len(data) > most:
+        raise error(f"{path}: larger than {most} bytes, which is too large to read.")
+    return data
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def read_document(
@@ -157,22 +156,70 @@ def read_document(
 
     Args:
         path: of the file.
-        kind: the struct.
+        kind: the struct. Where it has a field `format_version`, the default of that
+            field is the only version that is read.
         error: to raise.
         remedy: what the user can do, without a full stop: "train it again".
 
     Raises:
         BadInput: or the given subclass, in one line with file, field and remedy.
     """
+    data = read_file(path, error=error)
+    advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
     try:
-        return msgspec.json.decode(read_file(path, error=error), type=kind)
+        _check_version(path, data, kind, error)
+        return msgspec.json.decode(data, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
-        reason = " ".join(str(cause).split())[:_LONGEST_REASON]
-        advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
-        raise error(f"{path}: {reason}.{advice}") from None
+        raise error(f"{path}: {_reason(cause)}.{advice}") from None
 
 
 def write_document(path: Path, document: msgspec.Struct) -> None:
     """Write a struct as JSON with sorted keys: equal documents are equal bytes."""
     # By way of builtins: msgspec would write NaN as null.
     write_json(path, msgspec.to_builtins(document, order="sorted"))
+
+
+def checked(document: T, where: object) -> T:
+    """Return a struct whose fields were checked: constructors do not check them.
+
+    Args:
+        document: the struct.
+        where: the message begins with it.
+
+    Raises:
+        BadInput: a field has a wrong type or is out of range.
+    """
+    try:
+        return msgspec.convert(msgspec.to_builtins(document), type(document))
+    except msgspec.MsgspecError as cause:
+        raise BadInput(f"{where}: {_reason(cause)}.") from None
+
+
+class _Versioned(msgspec.Struct):
+    format_version: int
+
+
+def _check_version(path: Path, data: bytes, kind: type, error: type[BadInput]) -> None:
+    if "format_version" not in getattr(kind, "__struct_fields__", ()):
+        return
+    defaults = {each.name: each.default for each in msgspec.structs.fields(kind)}
+    known = defaults["format_version"]
+    found = msgspec.json.decode(data, type=_Versioned).format_version
+    if found == known:
+        return
+    age = "a later" if found > known else "an earlier"
+    remedy = "upgrade sainet" if found > known else "make it again"
+    raise error(
+        f"{path}: format_version is {found}, not {known}: it was made by {age} version "
+        f"of sainet; {remedy}."
+    )
+
+
+def _reason(cause: Exception) -> str:
+    """Return why a document was refused, with the field first."""
+    if isinstance(cause, RecursionError):
+        return "nested too deeply"
+    reason = shown(" ".join(str(cause).split()), _LONGEST_REASON)
+    text, _, field = reason.partition(" - at `")
+    field = field.strip("`").removeprefix("$").removeprefix(".")
+    return f"{field}: {text[:1].lower()}{text[1:]}" if field else text
