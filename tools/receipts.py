@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from sainet.control.trials import SUMMARY, episode_file
+from sainet.control.record import SUMMARY, episode_file
 from sainet.learning.log import LOG
 from sainet.models.card import CARD, WEIGHTS
 from sainet.runs.documents import read_json, write_bytes, write_json

@@ -24,8 +24,7 @@ from headlines import main as write_headlines
 from readings import ERRORS, FINAL_ERRORS, of_control, of_errors, of_groups
 from receipts import RECEIPTS, keep, restore
 
-from sainet.control.record import read_record
-from sainet.control.trials import episode_file
+from sainet.control.record import episode_file, read_record
 from sainet.identification.parameters import CAMERA
 from sainet.learning.recipes import PAPER, RESIDUAL
 from sainet.models.library import OF_STROKES

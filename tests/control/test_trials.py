@@ -17,9 +17,10 @@ from models.samples import identified_folder
 from models.test_checkpoint import write_network
 from sainet.control import trials
 from sainet.control.config import ControlConfig
+from sainet.control.record import SUMMARY, episode_file
 from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trial import make_trial
-from sainet.control.trials import episode_file, prepare, run_trials
+from sainet.control.trials import prepare, run_trials
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs.documents import read_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
@@ -62,7 +63,7 @@ def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
     out, records = done
     kept = episode_file(out, 0).stat().st_mtime_ns
     episode_file(out, 1).unlink()
-    (out / trials.SUMMARY).unlink()
+    (out / SUMMARY).unlink()
     told = []
     again = run_trials(CONFIG, out, on_episode=told.append)
     assert episode_file(out, 0).stat().st_mtime_ns == kept
@@ -75,10 +76,10 @@ def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ('{"solved": tr', "cannot be read as JSON"),
-        ("[]", "must hold a JSON object"),
-        ("{}", "trial is missing"),
-        ('{"trial": "0"}', "trial is '0'"),
+        ('{"solved": tr', "JSON is malformed"),
+        ("[]", "Expected `object`"),
+        ("{}", "missing required field `trial`"),
+        ('{"trial": "0"}', "trial: expected `int`"),
     ],
 )
 def test_a_damaged_episode_is_named_with_a_remedy(tmp_path, done, text, says):
@@ -193,16 +194,18 @@ def put(name, value):
 @pytest.mark.parametrize(
     ("damage", "says"),
     [
-        (lack("planned"), r"turns\[1\].planned is missing"),
-        (lack("distance_mm"), r"turns\[1\].distance_mm is missing"),
-        (lambda r: r["turns"].append(3), r"turns\[2\].observed is missing"),
-        (lambda r: r["turns"][0]["actual"].pop(), r"pusher is .* shape \[time, 2\]"),
-        (put("final", [[1, 2, 3]]), r"final is .* not numbers of shape \[disk, 3\]"),
-        (put("goal_mm", [1, None]), "goal_mm is"),
-        (put("goal_mm", [1, "2"]), "goal_mm is"),
-        (put("decision_s", [float("inf")]), "decision_s is"),
-        (put("tolerance_mm", float("nan")), "tolerance_mm is 'nan' and not a number"),
-        (put("final_mm", True), "final_mm is"),
+        (lack("planned"), r"turns\[1\]: .*field `planned`"),
+        (lack("distance_mm"), r"turns\[1\]: .*field `distance_mm`"),
+        (lambda r: r["turns"].append(3), r"turns\[2\]: expected `object`"),
+        (lambda r: r["turns"][0]["actual"].pop(), "pusher and actual differ in length"),
+        (put("final", [[1, 2, 3]]), "final has 1 of 2 disks"),
+        (put("goal_mm", [1, None]), r"goal_mm\[1\]: expected"),
+        (put("goal_mm", [1, "2"]), r"goal_mm\[1\]: expected"),
+        (put("decision_s", [1e400]), "JSON is malformed"),
+        (put("tolerance_mm", -1.0), "tolerance_mm: expected"),
+        (put("final_mm", True), "final_mm: expected"),
+        (put("radius_mm", [-54.0, 59.0]), r"radius_mm\[0\]: expected"),
+        (put("model", "\ud800"), "JSON is malformed|surrogate|Invalid"),
         (put("moved", 2), "moved is 2 of 2 disks"),
         (put("trial", 1), "trial is 1, another episode"),
     ],

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from report import samples
-from sainet.control.trials import FOLDER
+from sainet.control.record import FOLDER
 from sainet.models.library import PRETRAINED
 from sainet.report.figures.learning import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
@@ -92,7 +92,7 @@ def test_hidden_content_of_a_figure_is_left_out(tmp_path):
         ("table.json", "[]", "must hold a JSON object"),
         ("identified.json", '{"estimates": [{}]}', "damaged"),
         ("card.json", "{}", "format_version"),
-        ("episodes/000.json", "{}", "it is no episode"),
+        ("episodes/000.json", "{}", "missing required field"),
         ("paths.svg", "<svg><script>alert(1)</script></svg>", "<script> is nothing"),
         ("paths.svg", "<svg><g onclick='alert(1)'/></svg>", "<g> is nothing"),
         ("paths.svg", "<svg><g ONCLICK='alert(1)'/></svg>", "<g> is nothing"),

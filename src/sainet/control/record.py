@@ -1,20 +1,97 @@
-"""Records of episodes as JSON: decisions, predictions and observations of each push."""
+"""Records of episodes: decision, prediction and measured poses of every push."""
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
-from sainet.control.record_check import flaw
 from sainet.control.trial import Trial
-from sainet.runs.documents import read_json
+from sainet.runs.documents import read_document
 from sainet.runs.errors import BadInput
+from sainet.runs.folders import remake
+from sainet.scenes.quantities import MOST_DISKS, PUSHER_RADIUS, RADIUS, Friction
 from sainet.scenes.state import State
 
+SUMMARY = "episodes.json"
+FOLDER = "episodes"
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
+
+# In mm and degrees. None: the simulation produced NaN or infinity.
+_Place = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)] | None
+_Pose = Annotated[list[_Place], msgspec.Meta(min_length=3, max_length=3)]
+_Point = Annotated[list[_Place], msgspec.Meta(min_length=2, max_length=2)]
+_Known = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
+_Positive = Annotated[float, msgspec.Meta(gt=0, le=1e6)]
+_Count = Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
+_RadiusMm = Annotated[float, RADIUS.times(1000, "mm").meta]
+_PusherRadiusMm = Annotated[float, PUSHER_RADIUS.times(1000, "mm").meta]
+
+
+class TurnRecord(msgspec.Struct, kw_only=True):
+    """One decision and its push."""
+
+    contact_angle_deg: _Place = None
+    direction_deg: _Place = None
+    length_mm: _Place = None
+    speed_mm_s: _Place = None
+    observed: list[_Pose]  # of each disk, before the push
+    distance_mm: _Place  # of the target disk from the goal, as observed
+    planned_pushes: _Count = 1
+    planned: list[list[_Pose]]  # predicted poses by time and disk
+    planned_distance_mm: _Place = None
+    looked_at: _Count = 0  # candidate pushes
+    is_complete: bool = True  # False: the deadline ended the search
+    warnings: list[str] = []
+    actual: list[list[_Pose]]  # measured poses by time and disk
+    pusher: list[_Point]  # by time
+    trouble: str = ""
+
+
+class EpisodeRecord(msgspec.Struct, kw_only=True):
+    """One episode; lengths in mm, angles in degrees."""
+
+    trial: _Count
+    model: str
+    goals: str
+    reason: str
+    solved: bool
+    final_mm: _Place  # true distance of the target disk from the goal
+    pushes: _Count
+    final: list[_Pose]  # true pose of each disk
+    decision_s: list[Annotated[float, msgspec.Meta(ge=0, le=1e9)]]
+    goal_mm: Annotated[list[_Known], msgspec.Meta(min_length=2, max_length=2)]
+    moved: _Count  # index of the target disk
+    radius_mm: Annotated[
+        list[_RadiusMm], msgspec.Meta(min_length=1, max_length=MOST_DISKS)
+    ]
+    pusher_radius_mm: _PusherRadiusMm
+    tolerance_mm: _Positive
+    table_friction: Friction
+    turns: list[TurnRecord]
+
+    def __post_init__(self) -> None:
+        """Check lengths that depend on each other."""
+        disks = len(self.radius_mm)
+        if not 0 <= self.moved < disks:
+            raise ValueError(f"moved is {self.moved} of {disks} disks")
+        if len(self.final) != disks:
+            raise ValueError(f"final has {len(self.final)} of {disks} disks")
+        for index, turn in enumerate(self.turns):
+            paths = [turn.observed, *turn.planned, *turn.actual]
+            if {len(poses) for poses in paths} != {disks}:
+                raise ValueError(f"turns[{index}] does not have {disks} disks")
+            if len(turn.pusher) != len(turn.actual):
+                raise ValueError(f"turns[{index}]: pusher and actual differ in length")
+
+
+class Finished(msgspec.Struct):
+    """The files of a finished run, relative to its folder; written last."""
+
+    episodes: list[str]
 
 
 def record(
@@ -22,8 +99,8 @@ def record(
 ) -> dict[str, Any]:
     """Return the record of an episode; lengths in mm, angles in degrees.
 
-    `solved` uses the true final pose, not the measured pose, which is noisy. NaN and
-    infinity are None.
+    `solved` uses the true pose, not the measured pose, which is noisy. NaN and infinity
+    become None.
     """
     task, robot = trial.task, trial.robot
     final = 1000 * float(task.distance(robot.truth))
@@ -49,19 +126,39 @@ def record(
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Return the record of an episode.
+    """Read the record of an episode, checked against `EpisodeRecord`.
 
     Raises:
-        BadInput: the file is damaged or not an episode.
+        BadInput: it is damaged, or the record of another episode.
     """
-    again = "delete it and run the same command to repeat this episode"
-    try:
-        found = read_json(path)
-    except BadInput as error:
-        raise BadInput(f"{error} Or {again}.") from None
-    if wrong := flaw(found, path.stem):
-        raise BadInput(f"{path}: not a valid episode, {wrong}; {again}.")
-    return found
+    remedy = "delete it and run the same command: that episode is run again"
+    found = read_document(path, EpisodeRecord, remedy=remedy)
+    if f"{found.trial:03d}" != path.stem:
+        raise BadInput(
+            f"{path}: trial is {found.trial}, which is another episode; {remedy}."
+        )
+    return msgspec.to_builtins(found)
+
+
+def episode_file(out: Path, trial: int) -> Path:
+    """Return the file of the record of an episode."""
+    return out / FOLDER / f"{trial:03d}.json"
+
+
+def episode_files(out: Path) -> list[Path]:
+    """Return the files of all recorded episodes of a run folder.
+
+    Raises:
+        BadInput: the run is finished and an episode is missing.
+    """
+    files = sorted((out / FOLDER).glob("[0-9]*.json"))
+    files = [path for path in files if path.suffixes == [".json"]]
+    if (out / SUMMARY).exists():
+        remedy = remake(out)
+        for name in read_document(out / SUMMARY, Finished, remedy=remedy).episodes:
+            if out / name not in files:
+                raise BadInput(f"{out / name}: this episode is missing; {remedy}.")
+    return files
 
 
 def _turn(trial: Trial, turn: Turn) -> dict[str, Any]:

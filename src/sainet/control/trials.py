@@ -10,20 +10,23 @@ import jax
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, run_episode
-from sainet.control.record import read_record, record
+from sainet.control.record import (
+    SUMMARY,
+    Finished,
+    episode_file,
+    read_record,
+    record,
+)
 from sainet.control.trial import make_trial
 from sainet.engines import make_engine
 from sainet.models.library import load_model
 from sainet.models.model import Model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
-from sainet.runs.documents import write_json
+from sainet.runs.documents import write_document, write_json
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
 from sainet.scenes.scene import TIME_STEP
-
-SUMMARY = "episodes.json"
-FOLDER = "episodes"
 
 Told = Callable[[dict[str, Any]], None]
 
@@ -58,14 +61,9 @@ def run_trials(
     for index in each_done(executor, run_trial, missing):
         on_episode(read_record(files[index]))
     records = [read_record(path) for path in files]
-    told = {"episodes": [str(path.relative_to(out)) for path in files]}
-    write_json(folder.path / SUMMARY, told)
+    names = [path.relative_to(out).as_posix() for path in files]
+    write_document(folder.path / SUMMARY, Finished(names))
     return records
-
-
-def episode_file(out: Path, trial: int) -> Path:
-    """Return the path of the record of an episode."""
-    return out / FOLDER / f"{trial:03d}.json"
 
 
 def run_trial(config: ControlConfig, out: Path, index: int) -> int:

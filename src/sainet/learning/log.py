@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from sainet.runs.documents import is_number, write_bytes
+from sainet.runs.documents import is_number, read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
 
 LOG = "log.jsonl"
@@ -19,7 +19,7 @@ def read_log(folder: Path) -> list[dict[str, Any]]:
     path = folder / LOG
     if not path.is_file():
         return []
-    *lines, _ = path.read_bytes().split(b"\n")
+    *lines, _ = read_file(path, most=1 << 30, error=BadCheckpoint).split(b"\n")
     return [_parsed(path, number, line) for number, line in enumerate(lines, 1)]
 
 

@@ -7,8 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sainet.runs.documents import write_bytes
+from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
+
+_LARGEST = 1 << 30  # bytes of a file
 
 
 def save_arrays(path: Path, tree: Any) -> bytes:  # noqa: ANN401
@@ -36,10 +38,8 @@ def load_arrays(path: Path, like: Any) -> Any:  # noqa: ANN401
     from safetensors.numpy import load
 
     try:
-        found = load(path.read_bytes())
-    except FileNotFoundError:
-        raise BadCheckpoint(f"{path}: no such file; train the network again.") from None
-    except (OSError, SafetensorError, ValueError, KeyError) as error:
+        found = load(read_file(path, most=_LARGEST, error=BadCheckpoint))
+    except (SafetensorError, ValueError, KeyError) as error:
         raise BadCheckpoint(
             f"{path}: truncated or no safetensors file ({str(error).splitlines()[0]}); "
             "train the network again."

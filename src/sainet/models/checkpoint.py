@@ -10,7 +10,7 @@ from sainet.models.card import CARD, WEIGHTS, Card, read_card
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.features import FeatureSet, feature_set
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
-from sainet.runs.documents import content_hash
+from sainet.runs.documents import content_hash, read_file
 from sainet.runs.errors import BadCheckpoint
 
 
@@ -27,7 +27,7 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
     integrator = RelaxingResidual() if card.residual else Acceleration()
     network = untrained(features, card.time_step, integrator)
     loaded = load_arrays(folder / WEIGHTS, network)
-    if content_hash((folder / WEIGHTS).read_bytes()) != card.weights:
+    if content_hash(read_file(folder / WEIGHTS, error=BadCheckpoint)) != card.weights:
         raise BadCheckpoint(
             f"{folder / CARD}: weights is another hash than that of "
             f"{WEIGHTS}; the two do not belong together, train the network again."

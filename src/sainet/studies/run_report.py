@@ -6,8 +6,7 @@ from typing import Any
 
 import msgspec
 
-from sainet.control.record import read_record
-from sainet.control.trials import FOLDER
+from sainet.control.record import episode_files, read_record
 from sainet.models.card import CARD, read_card
 from sainet.models.identified import FILE as IDENTIFIED
 from sainet.models.identified import Identified, read_identified
@@ -44,7 +43,7 @@ def report_of(folder: Path) -> Report:
     card = msgspec.to_builtins(read_card(folder)) if (folder / CARD).is_file() else {}
     is_identified = (folder / IDENTIFIED).is_file()
     said = _estimates(read_identified(folder)) if is_identified else ()
-    episodes = [read_record(path) for path in _episode_files(folder)]
+    episodes = [read_record(path) for path in episode_files(folder)[:_EPISODES]]
     figures = tuple(_figures(folder))
     if not (table or card or is_identified or episodes or figures):
         raise BadInput(f"{folder}: nothing to show in it{_way_out(folder)}.")
@@ -87,11 +86,6 @@ def page_of(folder: Path) -> str:
 
 def _json(path: Path) -> dict[str, Any]:
     return read_json(path) if path.is_file() else {}
-
-
-def _episode_files(folder: Path) -> list[Path]:
-    files = sorted((folder / FOLDER).glob("[0-9]*.json"))
-    return [path for path in files if path.suffixes == [".json"]][:_EPISODES]
 
 
 def _figures(folder: Path) -> Iterator[tuple[Path, str]]:

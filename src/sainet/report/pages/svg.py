@@ -7,6 +7,7 @@ from xml.etree import ElementTree
 from markupsafe import Markup
 
 from sainet.report.palette import css_variables
+from sainet.runs.documents import read_file
 from sainet.runs.errors import BadInput
 
 _PIXELS_PER_POINT = 1.4
@@ -34,7 +35,7 @@ def read_svg(path: Path) -> str:
         BadInput: the file contains anything else, which might act in the page.
     """
     try:
-        figure = ElementTree.fromstring(path.read_text("utf-8"))
+        figure = ElementTree.fromstring(read_file(path).decode())
     except (OSError, ValueError, ElementTree.ParseError) as error:
         raise BadInput(f"{path}: cannot be read as a figure ({error}).") from None
     for about in figure.findall(f"{{{_NAMESPACES['']}}}metadata"):
