@@ -62,9 +62,10 @@ def test_identified_parameters_are_in_the_report(tmp_path):
     ]
     errors = {"before_mm": 2, "after_mm": 1, "before_deg": 5, "after_deg": 4}
     found = {"estimates": estimates, "pushes": 12, **errors}
+    found |= {"format_version": 2, "engine": {"simulator": {"engine": "planar"}}}
     write_json(tmp_path / "identified.json", found)
     page = page_of(tmp_path)
-    assert "Pusher friction: 0.31 [0.3, 0.32], 0.25 before." in page
+    assert "Pusher friction: 0.31 [0.3, 0.32], initially 0.25." in page
     assert "spin is not identifiable: it never spins." in page
     assert "Mean errors of 12 pushes: position 2.00 mm before" in page
 
@@ -90,7 +91,7 @@ def test_hidden_content_of_a_figure_is_left_out(tmp_path):
         ("table.json", '{"rows": 3}', "damaged"),
         ("table.json", '{"rows": [{"success": 1}]}', "damaged"),
         ("table.json", "[]", "must hold a JSON object"),
-        ("identified.json", '{"estimates": [{}]}', "damaged"),
+        ("identified.json", '{"estimates": [{}]}', "format_version"),
         ("card.json", "{}", "format_version"),
         ("episodes/000.json", "{}", "missing required field"),
         ("paths.svg", "<svg><script>alert(1)</script></svg>", "<script> is nothing"),

@@ -1,4 +1,4 @@
-"""Errors of the library as one line of the command line."""
+"""Errors of the library as lines of the command line."""
 
 import re
 from collections.abc import Iterator
@@ -10,14 +10,16 @@ from tyro.conf import Positional
 from sainet.runs.errors import SainetError, shown
 
 _POSITIONAL = get_args(Positional[int])[1]
-_LONGEST = 300  # characters
+_LONGEST = 300  # characters of a line
+_MOST_LINES = 50
 _QUOTED = re.compile(r"`([a-z][a-z0-9_]*)`")
 
 
 def message(error: SainetError, command: type | None = None) -> str:
-    """Return the message of an error in one line, with options for settings.
+    """Return the message of an error, with options for settings.
 
-    The library quotes settings in backquotes; those that the command has as options
+    Most messages are one line; a few list several problems, one a line. The library
+    quotes settings in backquotes; those that the command has as options
     become `--name`.
 
     Args:
@@ -30,13 +32,16 @@ def message(error: SainetError, command: type | None = None) -> str:
         name = found[1]
         return "--" + name.replace("_", "-") if name in options else found[0]
 
-    text = shown(" ".join(str(error).split()), None)
-    text = _QUOTED.sub(option, text)
-    if len(text) <= _LONGEST:
-        return text
+    lines = str(error).splitlines()[:_MOST_LINES]
+    return "\n".join(_short(_QUOTED.sub(option, shown(line, None))) for line in lines)
+
+
+def _short(line: str) -> str:
+    if len(line) <= _LONGEST:
+        return line
     # The end holds the remedy.
     half = (_LONGEST - len(" ... ")) // 2
-    return f"{text[:half]} ... {text[-half:]}"
+    return f"{line[:half]} ... {line[-half:]}"
 
 
 def _options(settings: Any) -> Iterator[str]:  # noqa: ANN401

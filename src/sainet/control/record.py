@@ -48,7 +48,7 @@ class TurnRecord(msgspec.Struct, kw_only=True):
     warnings: list[str] = []
     actual: list[list[_Pose]]  # measured poses by time and disk
     pusher: list[_Point]  # by time
-    trouble: str = ""
+    trouble: str | None = None
 
 
 class EpisodeRecord(msgspec.Struct, kw_only=True):
