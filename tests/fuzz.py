@@ -30,6 +30,7 @@ from pathlib import Path
 from unittest import mock
 
 import numpy as np
+from msgspec import structs
 
 TESTS = Path(__file__).resolve().parent
 for folder in (TESTS, TESTS.parent / "src"):
@@ -57,6 +58,7 @@ from sainet.runs.documents import (  # noqa: E402
     write_json,
 )
 from sainet.runs.errors import SainetError  # noqa: E402
+from sainet.runs.folders import open_run  # noqa: E402
 from sainet.scenes.camera import CameraOffset  # noqa: E402
 
 SLOWEST = 10.0  # s for one case
@@ -196,6 +198,23 @@ def make_store(out: Path) -> None:
         **{"pushes": 6, "chunk_size": 4, "hold_steps": 12, "stroke_mm": (8.0,)}
     )
     generate(config, out)
+
+
+def make_recorded(out: Path) -> None:
+    """Pushes with unknown poses and velocities, groups and repeats."""
+    make_store(out)
+    store = open_store(out)
+    arrays = store.read(slice(None))
+    arrays["truth"][:, ::3] = np.nan
+    arrays["truth"][..., 3:] = np.nan
+    arrays["pose_observed"][:, ::3] = 0
+    arrays["rate_observed"][:] = 0
+    arrays["group"] = np.arange(6) % 2
+    arrays["repeat"] = np.arange(6) // 2
+    groups = ("felt", "ice")
+    info = structs.replace(store.info, engine="recorded", groups=groups, seed=None)
+    shutil.rmtree(out / "pushes.zarr")
+    write_store(out, structs.replace(info, has_repeats=True), arrays)
 
 
 def rehash(store: Path) -> None:
@@ -472,8 +491,21 @@ def read_options(out: Path) -> None:
         numbers_of(command.config)
 
 
+SETTINGS = {"command": "fuzz", "seed": 0, "size": [1.0, 2.0]}
+
+
+def make_folder(out: Path) -> None:
+    open_run(out, SETTINGS, finished_by="end.json")
+
+
+def read_folder(out: Path) -> None:
+    open_run(out, SETTINGS, finished_by="end.json")
+
+
 TARGETS = [
     Target("dataset", make_store, damage_store, read_store),
+    Target("recorded", make_recorded, damage_store, read_store),
+    Target("folder", make_folder, damage_one, read_folder),
     Target("network", make_network, damage_network, read_model),
     Target("identified", make_identified, damage_one, read_model),
     Target("episodes", make_control, damage_one, read_episode),

@@ -6,13 +6,17 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
+import msgspec
 import pytest
 
 from sainet.runs.errors import BadInput, BadStore, RunConflict
 from sainet.runs.documents import (
     atomic_path,
     content_hash,
+    read_document,
+    read_file,
     read_json,
     to_json,
     write_bytes,
@@ -147,9 +151,51 @@ def test_settings_that_cannot_be_read_conflict(tmp_path):
     assert files(tmp_path) == {"config.json": b"{"}
 
 
-def test_a_run_killed_at_its_start_resumes(tmp_path):
+def test_a_folder_of_an_earlier_version_is_one_clear_line(tmp_path):
+    open_here(tmp_path / "run")
+    path = tmp_path / "run" / "manifest.json"
+    write_json(path, read_json(path) | {"format_version": 1})
+    with pytest.raises(RunConflict, match="made by an earlier version.*make it again"):
+        open_here(tmp_path / "run")
+
+
+def test_documents_of_hostile_fields_name_the_field(tmp_path):
+    class Known(msgspec.Struct):
+        size: float
+
+    path = tmp_path / "x.json"
+    for text, says in (
+        ('{"size": "%s"}' % ("x" * 9999), "size: expected `float`"),
+        ('{"size": NaN}', "malformed"),
+        ('{"size": 1e400}', "malformed|out of range"),
+        ('{"size": ' + "[" * 99999, "size: expected|recursion|nested|truncated"),
+        ('{"size": 1, "text": "\\ud800"}', "surrogate|malformed|truncated"),
+    ):
+        path.write_text(text)
+        with pytest.raises(BadInput, match=f"x.json: .*({says}).*Train it again") as bad:
+            read_document(path, Known, remedy="train it again")
+        assert len(str(bad.value)) < 300 + len(str(path))
+
+
+def test_files_are_regular_and_small_enough(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero"), tmp_path):
+        with pytest.raises(BadInput, match=f"{path}: (not a regular|cannot be read)"):
+            read_file(path)
+    (tmp_path / "x").write_bytes(b"12345")
+    assert read_file(tmp_path / "x", most=5) == b"12345"
+    with pytest.raises(BadInput, match="larger than 4 bytes"):
+        read_file(tmp_path / "x", most=4)
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(5):
+        with pytest.raises(BadInput):
+            read_file(tmp_path)
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+def test_a_run_killed_as_it_began_goes_on(tmp_path):
     (tmp_path / ".config.json.0.partial").write_text("{")
-    (tmp_path / "manifest.json").write_text("{}")
+    write_json(tmp_path / "manifest.json", manifest())
     open_here(tmp_path)
     assert files(tmp_path).keys() == {"config.json", "manifest.json"}
 
@@ -179,7 +225,7 @@ def test_a_run_folder_is_locked_by_its_process(tmp_path):
         assert other.stdout.readline() == b"at work\n"
         (folder / ".weights.0.partial").write_text("half")  # is being written
         before = files(tmp_path)
-        with pytest.raises(RunConflict, match="another sainet process is using this folder"):
+        with pytest.raises(RunConflict, match="another sainet process is using"):
             open_here(folder)
         assert files(tmp_path) == before
         (folder / "done").write_text("")
@@ -208,7 +254,7 @@ def test_manifests_depend_on_neither_time_nor_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert manifest(2) == first
     assert first["devices"] == 2
-    assert first["format_version"] == 1
+    assert first["format_version"] == 2
     assert first["versions"]["jax"]
     assert first["versions"]["scipy"]
     assert "pybullet" in first["versions"]  # None where it is not installed

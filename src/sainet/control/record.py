@@ -13,7 +13,14 @@ from sainet.control.trial import Trial
 from sainet.runs.documents import read_document
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import remake
-from sainet.scenes.quantities import MOST_DISKS, PUSHER_RADIUS, RADIUS, Friction
+from sainet.scenes.quantities import (
+    MOST_DISKS,
+    PUSHER_RADIUS,
+    RADIUS,
+    Finite,
+    Friction,
+    Size,
+)
 from sainet.scenes.state import State
 
 SUMMARY = "episodes.json"
@@ -21,10 +28,9 @@ FOLDER = "episodes"
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
 
 # In mm and degrees. None: the simulation produced NaN or infinity.
-_Place = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)] | None
+_Place = Finite | None
 _Pose = Annotated[list[_Place], msgspec.Meta(min_length=3, max_length=3)]
 _Point = Annotated[list[_Place], msgspec.Meta(min_length=2, max_length=2)]
-_Known = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]
 _Positive = Annotated[float, msgspec.Meta(gt=0, le=1e6)]
 _Count = Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
 _RadiusMm = Annotated[float, RADIUS.times(1000, "mm").meta]
@@ -62,8 +68,8 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
     final_mm: _Place  # true distance of the target disk from the goal
     pushes: _Count
     final: list[_Pose]  # true pose of each disk
-    decision_s: list[Annotated[float, msgspec.Meta(ge=0, le=1e9)]]
-    goal_mm: Annotated[list[_Known], msgspec.Meta(min_length=2, max_length=2)]
+    decision_s: list[Size]
+    goal_mm: Annotated[list[Finite], msgspec.Meta(min_length=2, max_length=2)]
     moved: _Count  # index of the target disk
     radius_mm: Annotated[
         list[_RadiusMm], msgspec.Meta(min_length=1, max_length=MOST_DISKS)

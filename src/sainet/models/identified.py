@@ -9,6 +9,7 @@ from sainet.engines.simulator import InternalEngine
 from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG, remake
+from sainet.scenes.quantities import Finite, Size
 
 FILE = "identified.json"
 FORMAT = 2
@@ -19,10 +20,10 @@ class Estimate(msgspec.Struct, frozen=True):
     """Estimate of one parameter."""
 
     name: str
-    value: float  # the initial value where the parameter is not identifiable
-    low: float  # of the 95 % interval
-    high: float
-    start: float  # initial value
+    value: Finite  # the initial value where the parameter is not identifiable
+    low: Finite  # of the 95 % interval
+    high: Finite
+    start: Finite  # initial value
     doubt: str | None = None  # why the parameter is not identifiable, if so
 
 
@@ -32,10 +33,10 @@ class Identified(msgspec.Struct, frozen=True, kw_only=True):
     engine: InternalEngine  # with the estimated parameters
     estimates: tuple[Estimate, ...]
     pushes: int
-    before_mm: float  # mean position error where poses were observed
-    after_mm: float
-    before_deg: float  # mean rotation error
-    after_deg: float
+    before_mm: Size  # mean position error where poses were observed
+    after_mm: Size
+    before_deg: Size  # mean rotation error
+    after_deg: Size
     format_version: Literal[2] = FORMAT
 
     def to_json(self) -> dict[str, Any]:

@@ -17,7 +17,6 @@ import msgspec
 from sainet.runs.errors import BadInput, shown
 
 
-FORMAT_VERSION = 1
 LARGEST_DOCUMENT = 64 << 20  # bytes
 _LONGEST_REASON = 200  # characters of a message that quote a file
 T = TypeVar("T")

@@ -7,15 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from sainet.runs.documents import (
+    read_document,
     read_json,
     readable,
     to_json,
     write_error,
     write_json,
 )
-from sainet.runs.errors import RunConflict
+from sainet.runs.errors import RunConflict, shown
 from sainet.runs.locks import FolderLock, lock_folder
-from sainet.runs.manifest import MANIFEST, manifest
+from sainet.runs.manifest import MANIFEST, Manifest, manifest
 
 CONFIG = "config.json"
 
@@ -93,6 +94,9 @@ def _check_free(path: Path, wanted: dict[str, Any]) -> None:
     """Raise `RunConflict` unless a folder is free or has the same settings."""
     if path.exists() and not path.is_dir():
         raise RunConflict(f"{path}: is a file; choose a folder as `out`.")
+    if (path / MANIFEST).exists():
+        remedy = remake(path)
+        read_document(path / MANIFEST, Manifest, error=RunConflict, remedy=remedy)
     if (path / CONFIG).exists():
         _check_same(path, read_json(path / CONFIG, RunConflict), wanted)
     elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
@@ -108,8 +112,8 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
     for name in sorted(found.keys() | wanted.keys()):
         if found.get(name) != wanted.get(name):
             raise RunConflict(
-                f"{path / CONFIG}: {name} is {found.get(name)!r}, not "
-                f"{wanted.get(name)!r}; choose another `out` or the same settings."
+                f"{path / CONFIG}: {shown(name)} is {shown(found.get(name))}, not "
+                f"{shown(wanted.get(name))}; choose another `out` or the same settings."
             )
 
 

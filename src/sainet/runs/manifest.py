@@ -1,4 +1,4 @@
-"""Manifests: versions, commit and hardware of a run."""
+"""Manifests of runs: versions, commit and hardware."""
 
 import os
 import platform
@@ -8,25 +8,45 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from sainet.runs.documents import FORMAT_VERSION
+import msgspec
 
 
 MANIFEST = "manifest.json"
+_PACKAGES = (
+    *("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr"),
+    "pybullet",
+)
+
+
+class Manifest(msgspec.Struct, frozen=True, kw_only=True):
+    """Versions, commit and hardware of a run; no dates, so that runs compare equal."""
+
+    versions: dict[str, str | None]
+    git_commit: str | None
+    python: str
+    machine: str
+    processor: str
+    cores: int | None
+    devices: int
+    format_version: int = 2
 
 
 def manifest(devices: int = 0) -> dict[str, Any]:
-    """Return versions, commit and hardware, without dates."""
-    names = ("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr")
-    return {
-        "format_version": FORMAT_VERSION,
-        "versions": {name: _version(name) for name in (*names, "pybullet")},
-        "git_commit": _git_commit(),
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-        "processor": processor(),
-        "cores": os.cpu_count(),
-        "devices": devices,
-    }
+    """Return the manifest of a run as JSON values.
+
+    Args:
+        devices: of JAX, where the result depends on their number.
+    """
+    found = Manifest(
+        versions={name: _version(name) for name in _PACKAGES},
+        git_commit=_git_commit(),
+        python=platform.python_version(),
+        machine=platform.machine(),
+        processor=processor(),
+        cores=os.cpu_count(),
+        devices=devices,
+    )
+    return msgspec.to_builtins(found)
 
 
 def _version(name: str) -> str | None:

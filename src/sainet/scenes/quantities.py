@@ -117,6 +117,9 @@ PressureRatio = Annotated[float, PRESSURE_RATIO.meta]
 OffsetMm = Annotated[float, CAMERA_OFFSET.meta]  # mm
 TimeStep = Annotated[float, TIME_STEP_RANGE.meta]  # s
 
+Finite = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]  # of any quantity
+Size = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]  # of an error or a duration
+
 MOST_DISKS = 100  # of a scene
 MOST_PUSHES = 10_000_000  # of a dataset
 MOST_STEPS = 100_000  # of a push
