@@ -32,7 +32,7 @@ _ENDS = ("low", "high")  # of a range
 _ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a frame
 
 
-class _Group(msgspec.Struct):
+class _Group(msgspec.Struct, forbid_unknown_fields=True):
     attributes: StoreInfo
     zarr_format: Literal[3]
     node_type: Literal["group"]
@@ -73,7 +73,7 @@ class _Zstd(msgspec.Struct, tag="zstd", tag_field="name"):
     configuration: _ZstdSettings
 
 
-class _Array(msgspec.Struct):
+class _Array(msgspec.Struct, forbid_unknown_fields=True):
     """The metadata of an array, restricted to arrays that the writer makes."""
 
     shape: tuple[int, ...]
