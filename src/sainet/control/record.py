@@ -11,7 +11,7 @@ from sainet.control.config import ControlConfig
 from sainet.control.episode import Episode, Turn
 from sainet.control.trial import Trial
 from sainet.runs.documents import read_document
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, shown
 from sainet.runs.folders import remake
 from sainet.scenes.quantities import (
     MOST_DISKS,
@@ -163,7 +163,9 @@ def episode_files(out: Path) -> list[Path]:
         remedy = remake(out)
         for name in read_document(out / SUMMARY, Finished, remedy=remedy).episodes:
             if out / name not in files:
-                raise BadInput(f"{out / name}: this episode is missing; {remedy}.")
+                raise BadInput(
+                    f"{out / shown(name)}: this episode is missing; {remedy}."
+                )
     return files
 
 

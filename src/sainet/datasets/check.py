@@ -10,11 +10,11 @@ import numpy as np
 
 from sainet.datasets.schema import (
     FORMAT_VERSION,
-    PUBLISHED,
     Arrays,
     StoreInfo,
     Variable,
     chunk_shape,
+    published_name,
     sizes,
     variables,
 )
@@ -220,13 +220,15 @@ def check_values(
         BadStore: a value is out of range; the message names array, push and value.
     """
     known = variables(info)
+    published = {published_name(model) for model in info.published}
     for name, values in arrays.items():
         quantities = _quantities(name, known[name], info)
         if not quantities or not values.size or _are_within(values, quantities):
             continue
         low, high = (np.array([getattr(q, end) for q in quantities]) for end in _ENDS)
         bad = ~((values >= low) & (values <= high))
-        bad &= ~(np.isnan(values) & ~_must_be_known(name, values, read))
+        known_only = name not in published
+        bad &= ~np.isnan(values) | (known_only & _must_be_known(name, values, read))
         if bad.any():
             place = tuple(np.argwhere(bad)[0])
             quantity = quantities[place[-1] if len(quantities) > 1 else 0]
@@ -258,8 +260,6 @@ def _must_be_known(
     name: str, values: np.ndarray, read: Callable[[str], np.ndarray]
 ) -> np.ndarray:
     """Return where values must be finite, in a shape that broadcasts to theirs."""
-    if name.startswith(PUBLISHED):
-        return np.zeros(1, bool)
     if name not in ("truth", "measured"):
         return np.ones(1, bool)
     exists = np.arange(values.shape[1]) < read("steps")[:, None]

@@ -31,8 +31,6 @@ FORMAT_VERSION = 2
 RECORDED = "recorded"  # instead of the engine that made the ground truth
 MOTION_UNITS = "m m rad m/s m/s rad/s"
 
-PUBLISHED = "published_"  # begins the names of arrays of published predictions
-
 Kind = Literal["robot", "direct-force"]
 # Part of a file name: of an engine or a model.
 _Name = Annotated[
@@ -205,7 +203,7 @@ def simulated_name(engine: str) -> str:
 
 def published_name(model: str) -> str:
     """Return the name of the array that holds a published model's prediction."""
-    return PUBLISHED + model
+    return "published_" + model
 
 
 def sizes(info: StoreInfo) -> dict[str, int]:
