@@ -32,48 +32,52 @@ _ENDS = ("low", "high")  # of a range
 _ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a frame
 
 
-class _Group(msgspec.Struct, forbid_unknown_fields=True):
+class _Metadata(msgspec.Struct, forbid_unknown_fields=True):
+    """A part of the metadata; Zarr refuses fields that it does not define."""
+
+
+class _Group(_Metadata):
     attributes: StoreInfo
     zarr_format: Literal[3]
     node_type: Literal["group"]
 
 
-class _ChunkShape(msgspec.Struct):
+class _ChunkShape(_Metadata):
     chunk_shape: tuple[int, ...]
 
 
-class _ChunkGrid(msgspec.Struct):
+class _ChunkGrid(_Metadata):
     name: Literal["regular"]
     configuration: _ChunkShape
 
 
-class _Separator(msgspec.Struct):
+class _Separator(_Metadata):
     separator: Literal["/"] = "/"
 
 
-class _ChunkKeys(msgspec.Struct):
+class _ChunkKeys(_Metadata):
     name: Literal["default"]
     configuration: _Separator = msgspec.field(default_factory=_Separator)
 
 
-class _BytesSettings(msgspec.Struct):
+class _BytesSettings(_Metadata):
     endian: Literal["little"] = "little"
 
 
-class _Bytes(msgspec.Struct, tag="bytes", tag_field="name"):
+class _Bytes(_Metadata, tag="bytes", tag_field="name"):
     configuration: _BytesSettings = msgspec.field(default_factory=_BytesSettings)
 
 
-class _ZstdSettings(msgspec.Struct):
+class _ZstdSettings(_Metadata):
     level: int
     checksum: bool = False
 
 
-class _Zstd(msgspec.Struct, tag="zstd", tag_field="name"):
+class _Zstd(_Metadata, tag="zstd", tag_field="name"):
     configuration: _ZstdSettings
 
 
-class _Array(msgspec.Struct, forbid_unknown_fields=True):
+class _Array(_Metadata):
     """The metadata of an array, restricted to arrays that the writer makes."""
 
     shape: tuple[int, ...]
