@@ -171,7 +171,7 @@ def test_unknown_paths_are_refused(tmp_path):
         if name == "truth":
             arrays["pose_observed"][push, 3] = arrays["rate_observed"][push, 3] = 0
         data = write(tmp_path / name, info, arrays)
-        says = "truth is not known at every step|truth_pusher: push 1: position is nan"
+        says = "truth is unknown at some steps|truth_pusher: push 1: position is nan"
         with pytest.raises(BadStore, match=says):
             add_bystander(data, tmp_path / f"{name}-out")
         assert not (tmp_path / f"{name}-out" / "hashes.json").exists()

@@ -76,7 +76,7 @@ def test_an_interruption_quietly_ends_all_jobs(
 
 def test_a_killed_worker_is_reported_with_a_remedy():
     with (
-        pytest.raises(SainetError, match="want of memory.*fewer workers") as told,
+        pytest.raises(SainetError, match="memory ran out.*fewer workers") as told,
         worker_pool(1) as pool,
     ):
         list(each_done(pool, os._exit, [(1,), (2,)]))
