@@ -25,7 +25,7 @@ COMPILE := $(PLAIN_PIP) .venv-lock/bin/pip-compile --quiet --build-deps-for whee
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 UPGRADE ?=
 
-.PHONY: help setup setup-dev test demo check format results bench lock lower-bounds torch-env clean
+.PHONY: help setup setup-dev test demo check format bench lock lower-bounds torch-env clean
 
 help:  ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) \
@@ -54,8 +54,8 @@ format: setup-dev  ## Rewrite the sources the way `make check` wants them
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-results: setup-dev  ## Measure every figure of docs/results.md again (long)
-	$(BIN)/python tools/results.py
+pages: setup  ## Render docs/results/, figures and README.md from results/
+	$(BIN)/python -m sainet.report.pages.results
 
 bench: setup-dev  ## Run the benchmarks
 	$(BIN)/sainet bench

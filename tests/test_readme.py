@@ -2,7 +2,6 @@
 
 import json
 import re
-import runpy
 import shlex
 import subprocess
 import sys
@@ -100,26 +99,3 @@ def test_the_reader_finds_commands():
     text += "\n    sainet bench  # all\n"
     assert commands(text) == ["sainet demo", "sainet train sain", "sainet bench"]
     assert make_targets(text + "`make check`") == {"test", "check"}
-
-
-HEADLINES = runpy.run_path(str(REPOSITORY / "tools" / "headlines.py"))
-RESULTS = (REPOSITORY / "docs" / "results.md").read_text("utf-8")
-
-
-def test_figures_are_those_of_the_page_of_results():
-    readme = README.read_text("utf-8")
-    assert HEADLINES["updated"](readme, RESULTS) == readme
-
-
-def test_another_figure_on_the_page_is_another_in_the_readme():
-    readme = README.read_text("utf-8")
-    page = re.sub(r"(`full_tree_s` \|) [0-9.]+", r"\1 9.87", RESULTS)
-    assert "in 9.87 s on 2 cores" in HEADLINES["updated"](readme, page)
-
-
-def test_figures_without_their_row_or_their_place_are_refused():
-    readme = README.read_text("utf-8")
-    with pytest.raises(ValueError, match="0 rows have"):
-        HEADLINES["updated"](readme, RESULTS.replace("| SAIN |", "| other |"))
-    with pytest.raises(ValueError, match=r"README\.md has no"):
-        HEADLINES["updated"]("# sainet", RESULTS)

@@ -6,7 +6,7 @@ The paper's are trained as seed 0 of Table III is (`sainet reproduce robot-two-d
 what that has trained already is the same folder and is not trained again. Weights that
 come from another machine or number of devices differ, so the networks that ship are
 trainings of their own. Those of strokes go on from the paper's, as they are shipped:
-who replaces some replaces all, and what docs/results.md says of them.
+who replaces some replaces all, and what docs/results/ says of them.
 """
 
 import argparse

@@ -2,7 +2,6 @@
 
 import json
 import math
-import runpy
 import shutil
 import signal
 import subprocess
@@ -10,6 +9,7 @@ import sys
 from dataclasses import replace
 
 import jax
+import msgspec
 import numpy as np
 import pytest
 
@@ -17,16 +17,17 @@ from models.samples import identified_folder
 from models.test_checkpoint import write_network
 from sainet.control import trials
 from sainet.control.config import ControlConfig
+from sainet.control.measure import measure_trials
 from sainet.control.record import SUMMARY, episode_file
-from sainet.control.summary import MEASURES, paired_test, summarise
 from sainet.control.trial import make_trial
 from sainet.control.trials import prepare, run_trials
+from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
+from sainet.models.identity import ModelId
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs.documents import read_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs.folders import CONFIG as CONFIG_FILE
 from sainet.scenes.recording import Recording
-from support import REPOSITORY
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
 
@@ -286,6 +287,18 @@ def test_bad_settings_are_named(name, value):
         ControlConfig(**{name: value})
 
 
+def summarise(records):
+    (row,) = trial_rows(measure_trials({ModelId(kind="in"): records}))
+    return row.to_dict()
+
+
+def paired_test(one, other, measure="solved"):
+    """The test of two models on the same goals."""
+    models = {ModelId(kind="in"): other, ModelId(kind="sain"): one}
+    found = {test.measure: test for test in compare_trials(measure_trials(models))}
+    return msgspec.structs.asdict(found[measure])
+
+
 def records_of(solved, pushes=20, final=3.0, reason="solved"):
     same = {"pushes": pushes, "final_mm": final, "reason": reason}
     return [{**same, "solved": s, "decision_s": [0.1, 0.3]} for s in solved]
@@ -328,32 +341,3 @@ def test_pairs_are_compared_by_each_measure():
         unlike = {measure: pair["only_one"] for measure, pair in found.items()}
         assert unlike == dict.fromkeys(MEASURES, 0) | {apart: 1}
         assert not any(pair["only_other"] for pair in found.values())
-
-
-def test_receipts_put_back_spare_running_again(done, tmp_path, monkeypatch):
-    tool = runpy.run_path(str(REPOSITORY / "tools" / "receipts.py"))
-    runs, receipts, elsewhere = tmp_path / "runs", tmp_path / "kept", tmp_path / "new"
-    out = done[0]
-    records = [read_json(episode_file(out, index)) for index in range(CONFIG.trials)]
-    shutil.copytree(out, runs / tool["TRIALS"] / "cell")
-    training, unfinished = (runs / "robot-paper" / name for name in ("sain", "in"))
-    for folder in (training, unfinished):
-        folder.mkdir(parents=True)
-        for name in tool["_TRAINING"]:
-            (folder / name).write_text(name)
-    (unfinished / "card.json").unlink()
-    shutil.copytree(unfinished, receipts / "robot-paper" / "sain")  # was interrupted
-    kept = [str(path.relative_to(receipts)) for path in tool["keep"](runs, receipts)]
-    assert kept == ["robot-paper/sain", f"{tool['TRIALS']}/cell.jsonl"]
-    tool["restore"](receipts, elsewhere)
-    for name in tool["_TRAINING"]:
-        assert (elsewhere / "robot-paper" / "sain" / name).read_text() == name
-    monkeypatch.setattr(trials, "run_episode", None)  # what is there is enough
-    found = run_trials(CONFIG, elsewhere / tool["TRIALS"] / "cell")
-    exact, kept = summarise(records), summarise(found)
-    assert kept.pop("median_decision_s") == pytest.approx(
-        exact.pop("median_decision_s"), abs=1e-4
-    )
-    assert kept == exact
-    # What is there stays as it is.
-    assert tool["keep"](runs, receipts) == tool["restore"](receipts, elsewhere) == []

@@ -13,7 +13,10 @@ from sainet.datasets.batch import to_batch
 from sainet.engines import make_engine
 from sainet.engines.assumed import AssumedProperties
 from sainet.engines.simulator import Assumptions
+from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.joining import pool_trainings
+from sainet.evaluation.summary import summarise
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.identity import ModelId
@@ -96,16 +99,16 @@ def test_pushes_of_mixed_length_keep_the_order_of_the_store(simulated, steps, li
         on_pushes=lambda *a: told.append(a),
     )
     mean, final, way = errors_at_rest(simulated, limit, 0.001)
-    np.testing.assert_allclose(found.errors["rest"].pos_mm, mean, rtol=1e-3)
-    np.testing.assert_allclose(found.errors["rest"].final_pos_mm, final, rtol=1e-3)
-    np.testing.assert_allclose(found.travel_mm, way, rtol=1e-3)
+    np.testing.assert_allclose(found.values("pos_mm", "rest"), mean, rtol=1e-3)
+    np.testing.assert_allclose(found.values("final_pos_mm", "rest"), final, rtol=1e-3)
+    np.testing.assert_allclose(found.data["travel_mm"].values, way, rtol=1e-3)
     assert sum(pushes for _, pushes in told) == PUSHES
 
 
 def test_groups_have_separate_means(simulated):
     found = evaluate([resting()], simulated)
     mean, _, _ = errors_at_rest(simulated, 12)
-    rows = found.to_dict()["rows"]
+    rows = to_json_object(summarise(found))["rows"]
     assert [(r["group"], r["body"]) for r in rows] == [
         ("even", 1),
         ("even", 2),
@@ -123,7 +126,7 @@ def test_groups_have_separate_means(simulated):
 
 def test_models_are_compared_pair_by_pair(simulated):
     models = [resting(), resting("same"), resting("shifted", 0.02)]
-    rows = evaluate(models, simulated).to_dict()["comparisons"]
+    rows = to_json_object(summarise(evaluate(models, simulated)))["comparisons"]
     pairs = [("same", "rest"), ("shifted", "rest"), ("shifted", "same")]
     found = dict.fromkeys((row["model"], row["against"]) for row in rows)
     assert list(found) == pairs
@@ -137,12 +140,12 @@ def test_models_are_compared_pair_by_pair(simulated):
 
 def test_recorded_pushes_have_final_errors_beside_published_ones(recorded):
     found = evaluate([resting()], recorded)
-    (row,) = found.to_dict()["rows"]
+    (row,) = to_json_object(summarise(found))["rows"]
     _, final, _ = errors_at_rest(recorded, 12)
     assert row["final_pos_mm"] == pytest.approx(final.mean(), rel=1e-3)
     assert row["group"] is None
     assert row["trans_percent"] == pytest.approx(row["pos_mm"] / 3.45)
-    (published,) = found.to_dict()["published"]
+    (published,) = to_json_object(summarise(found))["published"]
     assert published["model"] == "convex"
     assert published["final_pos_mm"] == pytest.approx(2, rel=1e-3)
     assert published["final_rot_deg"] == pytest.approx(3, rel=1e-3)
@@ -152,7 +155,7 @@ def test_recorded_pushes_have_final_errors_beside_published_ones(recorded):
 
 def test_unobserved_errors_are_nan_not_zero(recorded):
     found = evaluate([resting()], recorded, steps=8)
-    known = np.isfinite(found.errors["rest"].final_pos_mm[:, 0])
+    known = np.isfinite(found.values("final_pos_mm", "rest")[:, 0])
     np.testing.assert_array_equal(known, LENGTHS <= 8)
 
 
@@ -161,10 +164,10 @@ def test_the_true_engine_has_no_error(tmp_path_factory):
     exact = AssumedProperties(make_engine("planar"), Assumptions())
     truth = ModelId(kind="physics", name="truth")
     models = [Model(truth, PhysicsDynamics(exact)), load_model("physics")]
-    errors = evaluate(models, store).errors
+    found = evaluate(models, store)
     for name, tolerance in (("pos_mm", 1e-3), ("rot_deg", 1e-3)):
-        assert getattr(errors["truth"], name).max() < tolerance
-        assert getattr(errors["physics"], name).mean() > 100 * tolerance
+        assert found.values(name, "truth").max() < tolerance
+        assert found.values(name, "physics").mean() > 100 * tolerance
 
 
 CARD = Card(
@@ -198,7 +201,7 @@ def test_recorded_training_pushes_are_refused_as_test_pushes(recorded):
 
 def test_predictions_of_a_network_are_those_of_its_rollout(simulated):
     model = Model(ModelId(kind="in"), quick_dynamics("in", "robot"))
-    rows = evaluate([model], simulated, steps=5).to_dict()["rows"]
+    rows = to_json_object(summarise(evaluate([model], simulated, steps=5)))["rows"]
     arrays = simulated.read(slice(None))
     batch = to_batch(arrays, simulated.info, steps=5)
     rolled = predict(model.dynamics, batch.scene, batch.initial, batch.controls)
@@ -220,8 +223,8 @@ def test_trainings_are_pooled_into_one_model(simulated):
     shifts = {"a-0": 0.001, "a-1": 0.003}
     models = [resting(name, shift) for name, shift in shifts.items()]
     found = evaluate([resting(), *models, resting("z", 0.002)], simulated)
-    found.pool("a", list(shifts))
-    rows = found.to_dict()["rows"]
+    found = pool_trainings(found, {ModelId(kind="in", name="a"): list(shifts)})
+    rows = to_json_object(summarise(found))["rows"]
     assert list(dict.fromkeys(row["model"] for row in rows)) == ["rest", "a", "z"]
     mean, _, _ = np.mean(
         [errors_at_rest(simulated, 12, shift) for shift in shifts.values()], axis=0

@@ -1,25 +1,27 @@
 """Errors and their intervals against plain loops and cases that a hand can check."""
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 from scipy.stats import t as student_t
 
+from sainet.evaluation.as_json import to_json_object
+from sainet.evaluation.conditions import Condition, Header
 from sainet.evaluation.intervals import (
     difference_interval,
     mean_interval,
     ratio_interval,
 )
+from sainet.evaluation.joining import pool_trainings
+from sainet.evaluation.measurements import measurements_of
 from sainet.evaluation.metrics import (
-    PushErrors,
+    MEASURED,
     final_errors,
     final_pose,
-    pooled,
     push_errors,
     travel_mm,
 )
-from sainet.evaluation.rows import METRICS, comparison_rows, error_rows
+from sainet.evaluation.summary import summarise
+from sainet.models.identity import ModelId
 
 PUSHES, STEPS, BODIES = 6, 9, 2
 
@@ -53,10 +55,8 @@ def test_errors_are_those_of_plain_loops(poses):
                     places.append(1000 * np.hypot(p[0] - t[0], p[1] - t[1]))
                     turns.append(turn_between(p[2], t[2]))
             wanted = (np.mean(places), np.mean(turns), places[-1], turns[-1])
-            for metric, value in zip(METRICS, wanted, strict=True):
-                assert getattr(found, metric)[push, body] == pytest.approx(
-                    value, rel=1e-6
-                )
+            for metric, value in zip(MEASURED, wanted, strict=True):
+                assert found[metric][push, body] == pytest.approx(value, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -75,27 +75,26 @@ def test_a_translation_or_rotation_is_the_error(poses, shift, name, wanted):
     errors = push_errors(true + np.array(shift), true, observed)
     other = "rot_deg" if name == "pos_mm" else "pos_mm"
     for prefix in ("", "final_"):
-        np.testing.assert_allclose(getattr(errors, prefix + name), wanted, atol=1e-6)
-        np.testing.assert_allclose(getattr(errors, prefix + other), 0, atol=1e-6)
+        np.testing.assert_allclose(errors[prefix + name], wanted, atol=1e-6)
+        np.testing.assert_allclose(errors[prefix + other], 0, atol=1e-6)
 
 
 def test_angles_wrap_at_half_a_turn():
     predicted, true = np.zeros((2, 1, 1, 1, 3))
     predicted[..., 2], true[..., 2] = np.deg2rad(179), np.deg2rad(-181 + 360 + 2)
     errors = push_errors(predicted, true, np.ones((1, 1), bool))
-    assert errors.rot_deg[0, 0] == pytest.approx(2)
+    assert errors["rot_deg"][0, 0] == pytest.approx(2)
     true[..., 2] = np.deg2rad(-179)
     errors = push_errors(predicted, true, np.ones((1, 1), bool))
-    assert errors.rot_deg[0, 0] == pytest.approx(2)
+    assert errors["rot_deg"][0, 0] == pytest.approx(2)
 
 
 def test_unobserved_pushes_have_unknown_errors(poses):
     predicted, true, observed = poses
     observed[3] = False
     errors = push_errors(predicted, np.full_like(true, np.nan), observed)
-    for field in fields(errors):
-        known = np.isfinite(getattr(errors, field.name))
-        assert not known[3].any()
+    for values in errors.values():
+        assert not np.isfinite(values)[3].any()
     ends = final_pose(true, observed)
     assert np.isnan(ends[3]).all()
     assert np.isfinite(np.delete(ends, 3, axis=0)).all()
@@ -111,10 +110,10 @@ def test_final_poses_are_the_last_observed_poses(poses):
 def test_errors_of_final_poses(poses):
     true = poses[1][:, 0]
     errors = final_errors(true + np.array([0.0, 0.002, np.deg2rad(3)]), true)
-    np.testing.assert_allclose(errors.final_pos_mm, 2)
-    np.testing.assert_allclose(errors.final_rot_deg, 3)
-    assert np.isnan(errors.pos_mm).all()
-    assert np.isnan(errors.rot_deg).all()
+    np.testing.assert_allclose(errors["final_pos_mm"], 2)
+    np.testing.assert_allclose(errors["final_rot_deg"], 3)
+    assert np.isnan(errors["pos_mm"]).all()
+    assert np.isnan(errors["rot_deg"]).all()
 
 
 def test_travel_is_the_distance_between_the_ends():
@@ -123,35 +122,55 @@ def test_travel_is_the_distance_between_the_ends():
     np.testing.assert_allclose(travel_mm(start, end), [[5.0]])
 
 
-def errors_of(values) -> PushErrors:
-    return PushErrors(*(values * factor for factor in (1, 2, 3, 4)))
+def errors_of(values):
+    return {name: values * factor for factor, name in enumerate(MEASURED, start=1)}
+
+
+def measured(errors, travel, *, group="", reference=0.25):
+    """Measurements of models of one training each, ``{name: errors}``."""
+    stacked = {
+        name: np.stack([each[name][None] for each in errors.values()])
+        for name in MEASURED
+    }
+    header = Header(
+        models=tuple(ModelId(kind="in", name=name) for name in errors),
+        conditions=(Condition(label=group),),
+        reference_m=reference,
+    )
+    rows = np.arange(len(travel))
+    return measurements_of(stacked, travel, header, condition=0 * rows, row=rows)
+
+
+def rows_of(errors, travel, **settings):
+    found = to_json_object(summarise(measured({"m": errors}, travel, **settings)))
+    return found["rows"]
 
 
 @pytest.mark.parametrize("reference", [0.25, 0.345])
 def test_rows_hold_means_and_percentages(reference):
     values = np.array([[1.0, 2.0], [3.0, 6.0]])
     travel = np.array([[10.0, 5.0], [30.0, 11.0]])
-    rows = error_rows("m", errors_of(values), travel, group="g", reference=reference)
+    rows = rows_of(errors_of(values), travel, group="g", reference=reference)
     assert [(r["model"], r["body"], r["group"], r["n"]) for r in rows] == [
         ("m", 1, "g", 2),
         ("m", 2, "g", 2),
     ]
     for row, mean, way in zip(rows, (2.0, 4.0), (20.0, 8.0), strict=True):
-        for factor, name in enumerate(METRICS, start=1):
+        for factor, name in enumerate(MEASURED, start=1):
             assert row[name] == pytest.approx(factor * mean)
         assert row["trans_percent"] == pytest.approx(100 * mean / (1000 * reference))
         assert row["relative_percent"] == pytest.approx(100 * 3 * mean / way)
-        for name in (*METRICS, "trans_percent", "relative_percent"):
+        for name in (*MEASURED, "trans_percent", "relative_percent"):
             low, high = row[name + "_interval"]
             assert low <= row[name] <= high
 
 
 def test_rows_of_one_push_have_no_interval_and_unknown_is_none():
     unknown = np.full((1, 1), np.nan)
-    errors = PushErrors(unknown, unknown, np.ones((1, 1)), np.ones((1, 1)))
-    (row,) = error_rows("m", errors, np.ones((1, 1)), group=None, reference=0.25)
+    errors = errors_of(np.ones((1, 1))) | dict.fromkeys(("pos_mm", "rot_deg"), unknown)
+    (row,) = rows_of(errors, np.ones((1, 1)))
     assert row["pos_mm"] is None
-    assert row["final_pos_mm"] == 1
+    assert row["final_pos_mm"] == 3
     assert row["final_pos_mm_interval"] == [None, None]
 
 
@@ -238,21 +257,19 @@ def test_intervals_of_few_trainings_cover_about_95_times_in_100(trainings):
 
 def test_pooled_trainings_are_one_model():
     rng = np.random.default_rng(7)
-    parts = [errors_of(rng.uniform(size=(10, 2))) for _ in range(3)]
-    whole = pooled(parts)
-    assert whole.trainings == 3
-    rows = error_rows("m", whole, np.ones((10, 2)), group=None, reference=0.25)
-    for body, row in enumerate(rows):
-        mean = np.mean([part.pos_mm[:, body].mean() for part in parts])
+    parts = {f"m-{n}": errors_of(rng.uniform(size=(10, 2))) for n in range(3)}
+    runs = measured(parts, np.ones((10, 2)))
+    whole = pool_trainings(runs, {ModelId(kind="in", name="m"): list(parts)})
+    for body, row in enumerate(to_json_object(summarise(whole))["rows"]):
+        mean = np.mean([part["pos_mm"][:, body].mean() for part in parts.values()])
         assert (row["trainings"], row["pos_mm"]) == (3, pytest.approx(mean))
-    few = whole.of_pushes(np.arange(10) < 4)
-    np.testing.assert_array_equal(few.rot_deg[2], parts[2].rot_deg[:4])
 
 
 def test_a_model_does_not_differ_from_itself():
     errors = errors_of(np.random.default_rng(5).uniform(size=(10, 2)))
-    rows = comparison_rows(("a", errors), ("b", errors), group=None)
-    assert len(rows) == 2 * len(METRICS)
+    found = summarise(measured({"b": errors, "a": errors}, np.ones((10, 2))))
+    rows = to_json_object(found)["comparisons"]
+    assert len(rows) == 2 * len(MEASURED)
     for row in rows:
         assert (row["difference"], row["interval"]) == (0, [0, 0])
         assert (row["model"], row["against"]) == ("a", "b")

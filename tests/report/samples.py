@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from sainet.evaluation.conditions import Condition, PublishedValues
+from sainet.evaluation.summary import Comparison, Estimate, Factor, Row, Summary
+from sainet.models.identity import identity_named
 from sainet.report.replay import Replay, Track
 
 STEPS = 200
@@ -75,7 +78,7 @@ def histories():
     return found
 
 
-def row(model, body, scale, group=None):
+def row(model, body, scale, group="", **changes):
     values = {
         "trans_percent": 1.44 * scale,
         "pos_mm": 3.6 * scale,
@@ -84,16 +87,39 @@ def row(model, body, scale, group=None):
         "final_rot_deg": 1.1 * scale**0.5,
         "relative_percent": 34.0 * scale,
     }
-    intervals = {
-        f"{name}_interval": [0.94 * value, 1.07 * value]
-        for name, value in values.items()
-    }
-    head = {"model": model, "body": body, "group": group, "n": 500}
-    return head | values | intervals
+    estimates = {k: Estimate(v, 0.94 * v, 1.07 * v) for k, v in values.items()}
+    estimates |= changes
+    known = {k: v for k, v in estimates.items() if v is not None}
+    return Row(condition=group, model=model, body=body, values=known, count=500)
+
+
+def compared(model, against, difference=-0.162, metric="pos_mm"):
+    found = Estimate(difference, difference - 0.05, difference + 0.05)
+    names = {"condition": "", "model": model, "against": against}
+    return Comparison(**names, body=1, metric=metric, difference=found)
+
+
+def factor(model, error, baseline=3.6):
+    ratio = baseline / error
+    estimate = Estimate(ratio, 0.9 * ratio, 1.1 * ratio)
+    names = {"condition": "", "model": model, "metric": "pos_mm"}
+    return Factor(**names, error=error, baseline=baseline, factor=estimate)
+
+
+def summary(rows, **parts):
+    """Return a summary of such rows, in the order of their first occurrence."""
+    models = dict.fromkeys(row.model for row in rows)
+    conditions = dict.fromkeys(row.condition for row in rows)
+    return Summary(
+        models=tuple(map(identity_named, models)),
+        conditions=tuple(Condition(label=label) for label in conditions),
+        rows=tuple(rows),
+        **parts,
+    )
 
 
 def result():
-    """Return what ``sainet evaluate --json`` prints, for four models."""
+    """Return a summary of four models, with published values and a comparison."""
     scales = {"physics": 1.0, "physics-true": 0.23, "in": 0.21, "sain": 0.165}
     rows = [
         row(model, body, scale * (1.0, 0.9)[body - 1])
@@ -101,21 +127,18 @@ def result():
         for body in (1, 2)
     ]
     paper = {"physics": (6.27, 5.81), "in": (5.76, 3.84), "sain": (4.66, 3.47)}
-    published = [
-        {"model": model, "body": body, "group": None, "pos_mm": pair[body - 1]}
+    published = tuple(
+        PublishedValues(
+            condition="", model=identity_named(model), values={"pos_mm": pair}
+        )
         for model, pair in paper.items()
-        for body in (1, 2)
-    ]
-    comparison = {
-        "model": "sain",
-        "against": "in",
-        "body": 1,
-        "group": None,
-        "metric": "pos_mm",
-        "difference": -0.162,
-        "interval": [-0.21, -0.11],
-    }
-    return {"rows": rows, "published": published, "comparisons": [comparison]}
+    )
+    return summary(
+        rows,
+        published=published,
+        comparisons=(compared("sain", "in"),),
+        factors=tuple(factor(model, 3.6 * scale) for model, scale in scales.items()),
+    )
 
 
 def record(pushes=3, **changes):

@@ -2,27 +2,42 @@
 
 from xml.etree import ElementTree
 
+import msgspec
+
+from report import samples
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.summary import Estimate
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.report.palette import style_of
 
 
 def table(bodies=(1, 2)):
     errors = {"physics": (4, 4, 4), "in": (6, 1.5, 0.7), "sain": (2, 1, 0.6)}
+    sizes = (50, 500, 4500)
     rows = [
-        {
-            "model": model,
-            "body": body,
-            "group": f"{pushes:,}",
-            "pos_mm": error * body,
-            "pos_mm_interval": [0.8 * error * body, 1.2 * error * body],
-            "rot_deg": error / 2,
-            "rot_deg_interval": [0.4 * error, 0.6 * error],
-        }
+        samples.row(
+            model,
+            body,
+            1.0,
+            group=f"with {pushes}",
+            pos_mm=Estimate(error * body, 0.8 * error * body, 1.2 * error * body),
+            rot_deg=Estimate(error / 2, 0.4 * error, 0.6 * error),
+        )
         for model, values in errors.items()
-        for error, pushes in zip(values, (50, 500, 4500), strict=True)
+        for error, pushes in zip(values, sizes, strict=True)
         for body in bodies
     ]
-    return {"rows": rows}
+    conditions = [
+        Condition(label=f"with {pushes}", factors={"training_pushes": pushes})
+        for pushes in sizes
+    ]
+    other = Condition(
+        label="other seeds", factors={"training_pushes": 99, "seeds": "other"}
+    )
+    rows += [samples.row("in", body, 5.0, group="other seeds") for body in bodies]
+    return msgspec.structs.replace(
+        samples.summary(rows), conditions=(*conditions, other)
+    )
 
 
 def test_the_figure_has_every_model_and_is_reproducible(tmp_path):
@@ -35,6 +50,7 @@ def test_the_figure_has_every_model_and_is_reproducible(tmp_path):
         assert f">{style_of(name).label}</text>" in text
     for pushes in ("50", "500", "4,500"):
         assert f">{pushes}</text>" in text
+    assert ">99</text>" not in text  # it differs in more than the number of pushes
 
 
 def test_only_trained_models_have_a_band(tmp_path):

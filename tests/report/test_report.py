@@ -96,8 +96,7 @@ def test_the_replay_data_come_through_unchanged(report):
 
 
 def test_hostile_text_is_escaped_everywhere():
-    result = samples.result()
-    result["rows"][0] |= {"model": HOSTILE, "group": HOSTILE}
+    result = samples.summary([samples.row(HOSTILE, 1, 1.0, group=HOSTILE)])
     report = Report(
         title=HOSTILE,
         subtitle=HOSTILE,

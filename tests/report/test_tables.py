@@ -1,22 +1,33 @@
-"""The same numbers in a terminal, in Markdown and in HTML, and no markup from names."""
+"""The same numbers from all five writers, and no markup from names."""
 
+import csv
 import io
 import re
 from html.parser import HTMLParser
 
+import msgspec
 import pytest
 from rich.console import Console
 
 from report import samples
-from sainet.report.tables import print_table, to_html, to_markdown
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.summary import Summary
+from sainet.models.identity import identity_named
+from sainet.report.arrange import arrange
+from sainet.report.writers import print_table, to_csv, to_html, to_latex, to_markdown
 
 HOSTILE = "<script>alert(1)</script>|[red]*x*"
+NOTHING = Summary(models=())
 
 
-def printed(result, width=120):
+def printed(summary, width=120):
     stream = io.StringIO()
-    print_table(result, Console(file=stream, width=width, color_system=None))
+    print_table(arrange(summary), Console(file=stream, width=width, color_system=None))
     return stream.getvalue()
+
+
+def markdown(summary):
+    return to_markdown(arrange(summary))
 
 
 class Cells(HTMLParser):
@@ -41,9 +52,9 @@ class Cells(HTMLParser):
             self.rows[-1][-1] += data.strip()
 
 
-def parse(result):
+def parse(summary):
     cells = Cells()
-    cells.feed(to_html(result))
+    cells.feed(to_html(arrange(summary)))
     return cells
 
 
@@ -54,7 +65,7 @@ def test_html_has_every_number_in_its_cell():
 
 
 def test_markdown_rows_all_have_the_same_columns():
-    text = to_markdown(samples.result())
+    text = markdown(samples.result())
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert {len(re.split(r"(?<!\\)\|", row)) for row in rows} == {10}
     assert "| 3.60 / 3.24<br><sub>3.38–3.85 / 3.05–3.47</sub> |" in rows[2]
@@ -74,79 +85,130 @@ def test_terminal_shows_columns_by_disk_or_pairs_when_narrow():
     assert "…" not in narrow
 
 
-def test_the_best_of_each_group_is_marked():
+def test_every_writer_prints_the_same_numbers():
+    table = arrange(samples.result())
+    values = [cell.text for line in table.lines for cell in line.cells]
+    (_, *rows) = csv.reader(io.StringIO(to_csv(table)))
+    assert [value for row in rows[:4] for value in row[2::2]] == values
+    latex = re.sub(r"\\textbf{(.*?)}", r"\1", to_latex(table)).splitlines()
+    found = [line.removesuffix(r" \\").split(" & ")[2:] for line in latex[4:8]]
+    assert [value for line in found for value in line] == values
+
+
+def test_the_best_of_each_condition_is_marked():
     rows = [
         samples.row(model, 1, scale, group)
         for group, scales in (("abs-10", (1.0, 0.5)), ("plywood-10", (0.4, 0.8)))
         for model, scale in zip(("physics", "sain"), scales, strict=True)
     ]
-    lines = to_markdown({"rows": rows, "published": []}).splitlines()
+    lines = markdown(samples.summary(rows)).splitlines()
     assert [("**" in line) for line in lines[2:6]] == [False, True, True, False]
     assert lines[2].startswith("| abs-10 | Physics |")
 
 
-@pytest.mark.parametrize("missing", [None, float("nan"), float("inf"), "n/a"])
-def test_a_missing_number_is_a_dash(missing):
-    result = samples.result()
-    result["rows"][0] |= {"pos_mm": missing, "pos_mm_interval": None}
+def test_a_missing_number_is_a_dash():
+    (first, *rest) = samples.result().rows
+    missing = samples.row(first.model, 1, 1.0, pos_mm=None)
+    result = msgspec.structs.replace(samples.result(), rows=(missing, *rest))
     assert parse(result).rows[2][4] == "–"
-    assert "| – / 3.24" in to_markdown(result)
+    assert "| – / 3.24" in markdown(result)
     assert "nan" not in printed(result)
 
 
 def test_metrics_without_numbers_are_left_out():
-    rows = [{"model": "physics", "body": 1, "group": None, "n": 9, "final_pos_mm": 2.8}]
-    result = {"rows": rows, "published": []}
-    assert to_markdown(result).splitlines()[0] == "| Model | n | final pos (mm) |"
+    lacking = dict.fromkeys(samples.row("physics", 1, 1.0).values)
+    kept = samples.row("physics", 1, 1.0).values["final_pos_mm"]
+    row = samples.row("physics", 1, 1.0, **lacking | {"final_pos_mm": kept})
+    result = samples.summary([row])
+    assert markdown(result).splitlines()[0] == "| Model | n | final pos (mm) |"
     assert "trans" not in printed(result)
 
 
-def test_final_errors_are_not_repeated():
-    rows = [samples.row(model, 1, 0.5) for model in ("physics", "sain")]
-    for row in rows:
-        row |= {"pos_mm": row["final_pos_mm"], "rot_deg": row["final_rot_deg"]}
-    pair = {"model": "sain", "against": "physics", "group": None, "body": 1}
-    told = [
-        pair | {"metric": metric, "difference": -1.0, "interval": [-2.0, -0.5]}
+def test_where_only_ends_are_known_nothing_is_repeated():
+    def row(model, scale):
+        ends = samples.row(model, 1, scale).values
+        same = {"pos_mm": ends["final_pos_mm"], "rot_deg": ends["final_rot_deg"]}
+        return samples.row(model, 1, scale, **same)
+
+    pairs = [
+        samples.compared("sain", "physics", -1.0, metric)
         for metric in ("pos_mm", "final_pos_mm")
     ]
-    result = {"rows": rows, "comparisons": told}
-    heading = to_markdown(result).splitlines()[0]
+    rows = [row("physics", 1.0), row("sain", 0.5)]
+    result = samples.summary(rows, comparisons=tuple(pairs))
+    heading = markdown(result).splitlines()[0]
     assert heading.split(" | ")[2:4] == ["final pos (mm)", "final rot (deg)"]
     assert "trans" not in printed(result)
     assert printed(result).count("−1.000") == 1
-    alone = {"rows": rows, "comparisons": told[1:]}  # of ends alone: still said
+    alone = samples.summary(rows, comparisons=tuple(pairs[1:]))  # still reported
     assert printed(alone).count("−1.000") == 1
 
 
-def test_physics_is_the_reference_without_true_properties():
-    told = [
-        {"model": "sain", "against": against, "group": None, "body": 1}
-        | {"metric": "pos_mm", "difference": -1.0, "interval": None}
+def test_physics_is_compared_with_unless_true_properties_are():
+    pairs = {
+        against: samples.compared("sain", against, -1.0)
         for against in ("physics", "physics-true", "in")
-    ]
-    rows = {name: samples.row(name, 1, 0.5) for name in ("physics", "in", "sain")}
-    without = printed({"rows": [*rows.values()], "comparisons": [told[0], told[2]]})
-    assert "SAIN minus Physics: pos" in without
-    rows["physics-true"] = samples.row("physics-true", 1, 0.5)
-    beside = printed({"rows": [*rows.values()], "comparisons": told})
+    }
+    rows = [samples.row(name, 1, 0.5) for name in ("physics", "in", "sain")]
+    few = samples.summary(rows, comparisons=(pairs["physics"], pairs["in"]))
+    assert "SAIN minus Physics: pos" in printed(few)
+    true = samples.row("physics-true", 1, 0.4)
+    beside = printed(samples.summary([*rows, true], comparisons=tuple(pairs.values())))
     assert "SAIN minus Physics, true properties: pos" in beside
     assert "SAIN minus Physics: pos" not in beside
 
 
-def test_an_empty_table_is_a_sentence():
-    for text in (to_html({"rows": []}), to_markdown({"rows": []}), printed({})):
+def test_true_properties_that_change_nothing_are_said_once():
+    rows = [samples.row(name, 1, 0.5) for name in ("physics", "physics-true", "sain")]
+    pairs = tuple(samples.compared("sain", a) for a in ("physics", "physics-true"))
+    text = markdown(samples.summary(rows, comparisons=pairs))
+    assert "| Physics, true properties |" not in text
+    assert text.count("Physics, true properties") == 1
+    assert "do not change these predictions" in text
+    assert "SAIN minus Physics: pos" in text
+
+
+def test_a_table_ends_in_a_verdict():
+    text = printed(samples.result(), width=200)
+    assert text.rstrip().splitlines()[-1] == (
+        "SAIN: 0.59 mm where the engine errs by 3.60, 6.1 times less [5.5, 6.7]; the "
+        "network alone errs by 0.76; with true masses and radii the engine would err "
+        "by 0.83."
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (3.5, "no clear difference (ratio 1.03 [0.93, 1.13])"),
+        (7.2, "2.0 times more [1.82, 2.2]"),
+        (1.8, "2.0 times less [1.80, 2.2]"),
+    ],
+)
+def test_a_verdict_counts_only_what_is_clear(error, words):
+    rows = [samples.row(name, 1, 1.0) for name in ("physics", "sain")]
+    factors = samples.factor("physics", 3.6), samples.factor("sain", error)
+    assert words in printed(samples.summary(rows, factors=factors), width=200)
+
+
+def test_nothing_at_all_is_said_in_words():
+    for text in (to_html(arrange(NOTHING)), markdown(NOTHING), printed(NOTHING)):
         assert "Nothing to show" in text
 
 
 def test_hostile_names_stay_text():
     result = samples.result()
-    result["rows"] += [samples.row(HOSTILE, 1, 0.3, group=HOSTILE)]
+    result = msgspec.structs.replace(
+        result,
+        rows=(*result.rows, samples.row(HOSTILE, 1, 0.3, group=HOSTILE)),
+        models=(*result.models, identity_named(HOSTILE)),
+        conditions=(*result.conditions, Condition(label=HOSTILE)),
+    )
     cells = parse(result)
     assert "script" not in cells.tags
     assert "alert(1)" in str(cells.rows)
-    markdown = to_markdown(result)
-    assert "<script" not in markdown
-    rows = [line for line in markdown.splitlines() if line.startswith("|")]
+    text = markdown(result)
+    assert "<script" not in text
+    rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len({len(re.split(r"(?<!\\)\|", row)) for row in rows}) == 1
     assert "[red]" in printed(result, 200)

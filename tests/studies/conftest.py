@@ -6,9 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from sainet.evaluation.measurements import read_measurements
+from sainet.runs.documents import read_document
 from sainet.studies import load_experiment
 from sainet.studies.chain import Chain
 from sainet.studies.paper_setup import Sizes
+from sainet.studies.result import TABLE, Result
 
 
 @contextmanager
@@ -43,6 +46,13 @@ def chain(tmp_path):
 @pytest.fixture
 def make(tiny, chain, tmp_path):
     """Runs an experiment by name; all of a test share one folder."""
-    return lambda name: load_experiment(name)(
-        "quick", replace(chain, out=tmp_path / name)
-    )
+
+    def run(name):
+        own = replace(chain, out=tmp_path / name)
+        found = load_experiment(name)("quick", own)
+        assert read_document(own.out / TABLE, Result) == found
+        measured = read_measurements(own.out / "measurements.nc")
+        assert measured.header.conditions == found.summary.conditions
+        return found.to_json()
+
+    return run

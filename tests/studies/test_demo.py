@@ -11,9 +11,11 @@ from selenium.webdriver.support.ui import WebDriverWait
 from report.test_report_browser import element, milliseconds, opened
 from sainet.cli.output import Output
 from sainet.cli.reproduce import Reproduce
+from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
 from sainet.studies import EXPERIMENTS, load_experiment
 from sainet.studies.published import ROBOT_TWO_DISKS, published_rows
+from sainet.studies.result import Result
 from support import SOURCE
 
 TINY = ("--pushes", "100", "--test-pushes", "6", "--iterations", "2")
@@ -60,6 +62,9 @@ def test_an_unknown_study_lists_the_available_studies():
     assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
 
 
+NOTHING = Result(summary=Summary(models=()))
+
+
 @pytest.fixture
 def begun(monkeypatch):
     """The folders of the experiments that were begun; those below do nothing."""
@@ -67,7 +72,7 @@ def begun(monkeypatch):
     for name in ("robot_planar", "fine_tuning"):
         monkeypatch.setattr(
             f"sainet.studies.{name}.run",
-            lambda scale, chain: folders.append(chain.out.name) or {"rows": []},
+            lambda scale, chain: folders.append(chain.out.name) or NOTHING,
         )
     monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
     return folders

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from sainet.datasets.store import open_store
+from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.models.card import read_card
 from sainet.runs.documents import read_json
-from sainet.studies.data_efficiency import IN_FULL, again
+from sainet.studies.data_efficiency import AGAIN_CONDITION, IN_FULL
 from sainet.studies.paper_setup import AROUND, BYSTANDER, NETWORKS
-from sainet.studies.published import DIRECT_FORCE_THREE_DISKS, published_rows
+from sainet.studies.published import DIRECT_FORCE_THREE_DISKS
 from sainet.studies.regularisation import score
 from sainet.studies.robustness import push_angles
 from support import require
@@ -56,9 +57,13 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
     )
     assert new["started_from"] == old["weights"]
     assert new["identity"] == old["identity"]
-    assert three["published"] == published_rows(DIRECT_FORCE_THREE_DISKS)
-    kept = read_json(tmp_path / "direct-force-three-disks" / "table.json")
-    assert kept["rows"] == three["rows"]
+    published = {row["model"]: [] for row in three["published"]}
+    for row in three["published"]:
+        published[row["model"]].append(row["pos_mm"])
+    assert published == {
+        each.model.slug: list(each.values["pos_mm"])
+        for each in DIRECT_FORCE_THREE_DISKS
+    }
     made_by = read_json(tmp_path / "direct-force-three-disks" / "config.json")
     assert made_by["experiment"] == "direct-force-three-disks"
     versions = read_json(tmp_path / "direct-force-three-disks" / "manifest.json")
@@ -75,7 +80,7 @@ def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
     efficiency = make("data-efficiency")
     assert rows_of(efficiency) == {
         (group, m, b)
-        for group in ("3", "6", again(), IN_FULL)
+        for group in ("3", "6", AGAIN_CONDITION.label, IN_FULL.label)
         for m in models
         for b in (1, 2)
     }
@@ -114,14 +119,15 @@ def check_test_sets(folder):
 
 
 def test_the_score_is_the_mean_error_over_that_of_physics():
-    def row(model, pos, rot):
-        return {"model": model, "pos_mm": pos, "rot_deg": rot}
+    def row(model, body, pos, rot):
+        values = {"pos_mm": Estimate(pos), "rot_deg": Estimate(rot)}
+        return Row(condition="", model=model, body=body, values=values)
 
-    table = {
-        "rows": [
-            *(row("physics", 4.0, 1.0), row("physics", 2.0, 2.0)),
-            *(row("in", 1.0, 0.5), row("in", 1.0, 1.0)),
-            *(row("sain", 2.0, 0.5), row("sain", 0.5, 1.0)),
-        ]
-    }
-    assert score(table) == pytest.approx((0.25 + 0.5 + 0.5 + 0.25 + 4 * 0.5) / 8)
+    rows = (
+        *(row("physics", 1, 4.0, 1.0), row("physics", 2, 2.0, 2.0)),
+        *(row("in", 1, 1.0, 0.5), row("in", 2, 1.0, 1.0)),
+        *(row("sain", 1, 2.0, 0.5), row("sain", 2, 0.5, 1.0)),
+    )
+    assert score(Summary(models=(), rows=rows)) == pytest.approx(
+        (0.25 + 0.5 + 0.5 + 0.25 + 4 * 0.5) / 8
+    )

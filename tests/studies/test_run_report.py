@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import msgspec
 import pytest
 
 from report import samples
@@ -10,9 +11,10 @@ from sainet.control.record import FOLDER
 from sainet.models.library import PRETRAINED
 from sainet.report.figures.learning import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
-from sainet.runs.documents import write_json
+from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput
-from sainet.studies.run_report import TABLE, page_of, report_of
+from sainet.studies.result import TABLE, Result
+from sainet.studies.run_report import page_of, report_of
 from studies.test_simulated_control import result as control_table
 
 
@@ -29,7 +31,7 @@ def test_a_training_run_has_its_card_and_curve(tmp_path):
 
 def test_errors_episodes_and_figures_come_together(tmp_path):
     write_json(tmp_path / "config.json", {"command": "control", "seed": 3})
-    write_json(tmp_path / TABLE, samples.result())
+    write_document(tmp_path / TABLE, Result(summary=samples.result()))
     for trial in range(8):
         write_json(tmp_path / FOLDER / f"{trial:03d}.json", samples.record(trial=trial))
     (tmp_path / FOLDER / "008.interrupted.json").write_text("cut sho")
@@ -37,16 +39,16 @@ def test_errors_episodes_and_figures_come_together(tmp_path):
     (tmp_path / "of-somebody.svg").write_text("<svg onload='alert(1)'/>")
     report = report_of(tmp_path)
     assert len(report.episodes) == 6
-    assert "'sainet control' left" in report.subtitle
+    assert "Output of 'sainet control'" in report.subtitle
     page = page_of(tmp_path)
     assert "Prediction errors" in page
     assert "alert" not in page
 
 
-def test_control_results_have_their_own_table(tmp_path):
-    table = control_table()
-    table["rows"][0]["group"] = "<b>easy</b>"
-    write_json(tmp_path / TABLE, table)
+def test_goals_are_a_table_of_their_own(tmp_path):
+    row = msgspec.structs.replace(control_table().trials[0], condition="<b>easy</b>")
+    summary = msgspec.structs.replace(control_table(), trials=(row,))
+    write_document(tmp_path / TABLE, Result(summary=summary))
     page = page_of(tmp_path)
     assert "Goals reached" in page
     assert "&lt;b&gt;easy&lt;/b&gt;" in page
@@ -88,9 +90,9 @@ def test_hidden_content_of_a_figure_is_left_out(tmp_path):
     ("name", "text", "told"),
     [
         (None, None, "nothing to show"),
-        ("table.json", '{"rows": 3}', "damaged"),
-        ("table.json", '{"rows": [{"success": 1}]}', "damaged"),
-        ("table.json", "[]", "must hold a JSON object"),
+        ("table.json", "{}", "`summary`"),
+        ("table.json", '{"summary": {"models": [], "rows": 3}}', "`array`"),
+        ("table.json", "[]", "`object`"),
         ("identified.json", '{"estimates": [{}]}', "format_version"),
         ("card.json", "{}", "format_version"),
         ("episodes/000.json", "{}", "missing required field"),

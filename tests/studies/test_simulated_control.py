@@ -5,9 +5,15 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from sainet.report.control_table import control_markdown, is_control, print_control
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.summary import Summary
+from sainet.evaluation.trials import TrialRow, TrialTest
+from sainet.models.identity import identity_named
+from sainet.report.arrange import arrange
+from sainet.report.writers import print_table, to_markdown
 from sainet.runs.documents import read_json
 from sainet.studies import simulated_control
+from sainet.studies.published import SIMULATED_CONTROL
 from sainet.studies.simulated_control import Group, groups
 
 
@@ -45,51 +51,56 @@ def test_all_models_have_the_same_goals(make, tmp_path, monkeypatch):
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-def result():
-    row = {
-        "group": "hard, tree",
+def trials(model, **changes):
+    known = {
+        "condition": "hard, tree",
+        "model": model,
         "trials": 100,
         "solved": 98,
         "success": 0.98,
-        "interval": [0.93, 0.994],
+        "interval": (0.93, 0.994),
         "median_pushes": 24.5,
         "within_25_pushes": 0.61,
         "within_4_mm": 0.5,
+        "median_final_mm": 3.0,
         "median_decision_s": 0.4149,
         "ended_early": 1,
     }
+    return TrialRow(**known | changes)
+
+
+def compared(measure, p):
+    names = {"condition": "hard, tree", "model": "sain", "against": "in"}
+    return TrialTest(**names, measure=measure, only_one=6, only_other=1, p=p)
+
+
+def result():
     none = {"solved": 0, "success": 0.0, "median_pushes": None, "ended_early": 0}
-    rows = [row | {"model": "sain"}, row | none | {"model": "in"}]
-    pair = {"group": "hard, tree", "model": "sain", "against": "in"}
-    counts = {"only_one": 6, "only_other": 1, "p": 0.125}
-    pairs = [
-        pair | counts | {"measure": "solved"},
-        pair | counts | {"measure": "within_4_mm"},
-        pair | counts | {"measure": "within_25_pushes", "p": 0.031},
-    ]
-    theirs = {"group": "hard, greedy", "model": "in", "trials": 25, "success": 0.88}
-    return {"rows": rows, "pairs": pairs, "published": [theirs]}
+    return Summary(
+        models=(identity_named("sain"), identity_named("in")),
+        conditions=(Condition(label="hard, tree"),),
+        trials=(trials("sain"), trials("in", **none)),
+        tests=(
+            compared("solved", 0.125),
+            compared("within_4_mm", 0.125),
+            compared("within_25_pushes", 0.031),
+        ),
+        published=(SIMULATED_CONTROL[1],),
+    )
 
 
 def test_the_control_table_has_every_result_once():
     console = Console(record=True, width=140, file=None)
     with console.capture() as capture:
-        print_control(result(), console)
+        print_table(arrange(result()), console)
     text = capture.get()
     for part in ("98/100", "93%–99%", "24.5", "61%", "0.415", "22/25", "published"):  # noqa: RUF001
         assert part in text
-    told = "SAIN alone 6, IN alone 1 (exact McNemar p = "
+    told = "only SAIN 6, only IN 1 (exact McNemar p = "
     assert f"hard, tree, solved: {told}0.12)" in text
     assert f"hard, tree, within 25 pushes: {told}0.031)" in text
     assert "within 4 mm: " not in text  # may be chance
-    assert "SAIN: 1 of 2 not solved ended as the disk was seen there" in text
-    assert "IN: " not in text.replace("SAIN: ", "")
-    lines = control_markdown(result()).splitlines()
+    assert "SAIN: 1 of 2 unsolved trials ended because the measured pose" in text
+    lines = to_markdown(arrange(result())).splitlines()
     assert {line.count("|") for line in lines if line.startswith("|")} == {9}
     assert "| hard, tree | IN | 0/100 |" in lines[3]
-
-
-def test_error_tables_are_refused_as_control_tables():
-    assert is_control(result())
-    assert not is_control({"rows": [{"model": "in", "pos_mm": 1.0}]})
-    assert not is_control({"rows": []})

@@ -33,8 +33,10 @@ class Control:
     def run(self) -> dict[str, Any]:
         """Run the trials and say how they went."""
         use_cache()
-        from sainet.control.summary import summarise
+        from sainet.control.measure import measure_trials
         from sainet.control.trials import prepare, run_trials
+        from sainet.evaluation.trials import trial_rows
+        from sainet.models.identity import identity_named
         from sainet.report.figures.episodes import draw_episodes
 
         config = self.config
@@ -52,7 +54,8 @@ class Control:
         figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
         if self.animate:
             self._animate(records[:_DRAWN])
-        found = summarise(records)
+        (row,) = trial_rows(measure_trials({identity_named(config.model): records}))
+        found = row.to_dict()
         self.output.say(_outcome(config, found))
         drawn = f"the first {_DRAWN}" if config.trials > _DRAWN else "each"
         self.output.say(f"Episodes are in {self.out}, {drawn} drawn in {figure}.")

@@ -26,7 +26,9 @@ class Demo:
     def run(self) -> dict[str, Any]:
         """Run the demo."""
         use_devices(self.devices)
-        from sainet.report.tables import print_table
+        from sainet.evaluation.as_json import to_json_object
+        from sainet.report.arrange import arrange
+        from sainet.report.writers import print_table
         from sainet.studies.chain import Chain
         from sainet.studies.demo import run_demo
 
@@ -35,6 +37,6 @@ class Demo:
             say = partial(self.output.say, markup=True)
             chain = Chain(self.out, pool, say, bar)
             result = run_demo(self.config, chain)
-        print_table(result.table, self.output.console)
+        print_table(arrange(result.summary), self.output.console)
         self.output.say(f"Open {result.report} in a browser: it plays.")
-        return {"report": str(result.report), **result.table}
+        return {"report": str(result.report), **to_json_object(result.summary)}

@@ -39,9 +39,12 @@ class Evaluate:
         """Evaluate the models and print the table."""
         use_devices(self.devices)
         from sainet.datasets.store import open_store
+        from sainet.evaluation.as_json import to_json_object
         from sainet.evaluation.evaluate import evaluate
+        from sainet.evaluation.summary import summarise
         from sainet.models.library import load_model
-        from sainet.report.tables import print_table
+        from sainet.report.arrange import arrange
+        from sainet.report.writers import print_table
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
@@ -51,15 +54,16 @@ class Evaluate:
         ]
         total = store.info.pushes * len(models)
         with progress_bar("Predicting", total, self.output) as advance:
-            result = evaluate(
+            measured = evaluate(
                 models,
                 store,
                 steps=self.steps,
                 force=self.force,
                 on_pushes=lambda model, pushes: advance(pushes, model),
-            ).to_dict()
-        print_table(result, self.output.console)
-        return result
+            )
+        summary = summarise(measured)
+        print_table(arrange(summary), self.output.console)
+        return to_json_object(summary)
 
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit the data; say why not."""

@@ -20,6 +20,7 @@ from sainet.studies.config import Scale
 
 if TYPE_CHECKING:
     from sainet.studies.chain import Chain
+    from sainet.studies.result import Result
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,8 +53,8 @@ class Reproduce:
     def run(self) -> dict[str, Any]:
         """Run the experiments one after another."""
         use_devices(self.devices)
-        from sainet.report.control_table import is_control, print_control
-        from sainet.report.tables import print_table
+        from sainet.report.arrange import arrange
+        from sainet.report.writers import print_table
         from sainet.studies.chain import Chain
 
         tables: dict[str, Any] = {}
@@ -62,9 +63,9 @@ class Reproduce:
             chain = Chain(self.out, pool, self.output.say, bar, self.recorded, trainers)
             for name, make in self._look_up(chain).items():
                 own = replace(chain, out=self.out / f"{name}-{self.scale}")
-                tables[name] = make(self.scale, own)
-                show = print_control if is_control(tables[name]) else print_table
-                show(tables[name], self.output.console)
+                result = make(self.scale, own)
+                print_table(arrange(result.summary), self.output.console)
+                tables[name] = result.to_json()
         only = next(iter(tables.values()))
         return only if len(tables) == 1 else {"experiments": tables}
 
@@ -86,7 +87,7 @@ class Reproduce:
             raise BadInput(f"--trainers is {count}; on a GPU it must be 1.")
         return worker_pool(count, core_each=True) if count > 1 else nullcontext()
 
-    def _look_up(self, chain: "Chain") -> dict[str, Callable[..., dict[str, Any]]]:
+    def _look_up(self, chain: "Chain") -> dict[str, Callable[..., "Result"]]:
         """Return what makes each table; what cannot be had is said before any runs."""
         from sainet.engines import make_engine
         from sainet.studies import load_experiment, needs_bullet, needs_recorded

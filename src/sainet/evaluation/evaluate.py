@@ -1,9 +1,6 @@
 """Several models on the same stored pushes, side by side."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from itertools import combinations
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,97 +10,25 @@ from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import published_name, simulated_name, variables
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
-from sainet.evaluation.intervals import Folds
+from sainet.evaluation.conditions import Condition, Header, Provenance, TestSet
+from sainet.evaluation.conditions import Training as TrainingRun
+from sainet.evaluation.measurements import Measurements, measurements_of
 from sainet.evaluation.metrics import (
+    MEASURED,
     REFERENCE_DISTANCE,
-    PushErrors,
+    Errors,
     final_errors,
     final_pose,
-    pooled,
     push_errors,
     travel_mm,
 )
-from sainet.evaluation.rows import comparison_rows, error_rows
 from sainet.models.dynamics import AbstractDynamics
+from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200
 _BATCH = 256  # pushes that are predicted at a time: one compilation for each length
-
-
-@dataclass
-class Evaluation:
-    """Errors of every model for every push; `to_dict` is what tables show."""
-
-    errors: dict[str, PushErrors]
-    published: dict[str, PushErrors]
-    travel_mm: Float[np.ndarray, "push body"]
-    groups: tuple[str | None, ...]  # of each push
-    reference: float  # m, that trans (%) is relative to
-    curves: dict[str, np.ndarray] = field(default_factory=dict)
-    folds: Folds | None = None  # of each push, in a cross-validation
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return rows, published rows and paired comparisons as JSON values."""
-        pairs = combinations(self.errors.items(), 2)
-        return {
-            "rows": self._rows(self.errors),
-            "published": list(map(_without_intervals, self._rows(self.published))),
-            "comparisons": [
-                row
-                for (one, a), (other, b) in pairs
-                for group, part in self._parts()
-                for row in comparison_rows(
-                    (other, b.of_pushes(part)),
-                    (one, a.of_pushes(part)),
-                    group=group,
-                    folds=self.folds_of(part),
-                )
-            ],
-        }
-
-    def pool(self, name: str, members: Sequence[str]) -> None:
-        """Make one model of several trainings of it, in the place of the first."""
-        found = {member: self.errors[member] for member in members}
-        whole = pooled(list(found.values()))
-        self.errors = {
-            name if model == members[0] else model: whole if model in found else errors
-            for model, errors in self.errors.items()
-            if model not in members[1:]
-        }
-
-    def _rows(self, errors: dict[str, PushErrors]) -> list[dict[str, Any]]:
-        """Return the rows of each group, in it of each model."""
-        return [
-            row
-            for group, part in self._parts()
-            for name, found in errors.items()
-            for row in error_rows(
-                name,
-                found.of_pushes(part),
-                self.travel_mm[part],
-                group=group,
-                reference=self.reference,
-                folds=self.folds_of(part),
-            )
-        ]
-
-    def folds_of(self, part: np.ndarray) -> Folds | None:
-        """Return the folds of some pushes, if there are any."""
-        if self.folds is None:
-            return None
-        return tuple(np.array(self.folds)[part].tolist())
-
-    def _parts(self) -> Iterator[tuple[str | None, np.ndarray]]:
-        """Yield each group and which pushes belong to it."""
-        owners = np.array([group or "" for group in self.groups])
-        for name in sorted(set(owners)):
-            yield name or None, owners == name
-
-
-def _without_intervals(row: dict[str, Any]) -> dict[str, Any]:
-    return {k: v for k, v in row.items() if not k.endswith("_interval")}
 
 
 def evaluate(
@@ -113,7 +38,7 @@ def evaluate(
     steps: int | None = None,
     force: bool = False,
     on_pushes: Callable[[str, int], None] = lambda model, pushes: None,
-) -> Evaluation:
+) -> Measurements:
     """Predict every stored push with every model and measure the errors.
 
     Args:
@@ -140,17 +65,15 @@ def evaluate(
     arrays = _read(store)
     limit = _limit(store, steps)
     parts = list(_parts_of_one_length(arrays, limit))
-    errors: dict[str, PushErrors] = {}
+    errors: list[Errors] = []
     for model in models:
         poses = _predict_all(model, store, arrays, parts, on_pushes)
-        errors[model.name] = _join(
-            [
-                push_errors(poses[i], *_truth(arrays, part, length))
-                for i, (part, length) in enumerate(parts)
-            ],
-            parts,
-        )
-    return _evaluation(store, arrays, errors, parts)
+        found = [
+            push_errors(poses[i], *_truth(arrays, part, length))
+            for i, (part, length) in enumerate(parts)
+        ]
+        errors.append(_in_order(found, parts))
+    return _measurements(models, store, arrays, errors, parts)
 
 
 def predict_ends(
@@ -262,34 +185,68 @@ def _predict_pose(
     return jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
 
 
-def _join(errors: list[PushErrors], parts: list[tuple[np.ndarray, int]]) -> PushErrors:
+def _in_order(errors: list[Errors], parts: list[tuple[np.ndarray, int]]) -> Errors:
     """Put the errors of all parts back into the order of the store."""
     order = np.argsort(np.concatenate([part for part, _ in parts]))
-    stacked = {
-        name: np.concatenate([vars(e)[name] for e in errors])[order]
-        for name in vars(errors[0])
+    return {
+        name: np.concatenate([each[name] for each in errors])[order]
+        for name in errors[0]
     }
-    return PushErrors(**stacked)
 
 
-def _evaluation(
+def _measurements(
+    models: Sequence[Model],
     store: Store,
     arrays: dict[str, np.ndarray],
-    errors: dict[str, PushErrors],
+    errors: list[Errors],
     parts: list[tuple[np.ndarray, int]],
-) -> Evaluation:
+) -> Measurements:
     order = np.argsort(np.concatenate([part for part, _ in parts]))
     ends = [final_pose(*_truth(arrays, part, steps)) for part, steps in parts]
     final = np.concatenate(ends)[order]
-    recorded = store.info.is_recorded
-    names = store.info.groups
-    return Evaluation(
-        errors=errors,
-        published={
-            name: final_errors(arrays[published_name(name)].astype(np.float64), final)
-            for name in store.info.published
-        },
-        travel_mm=travel_mm(arrays["initial"][..., :3].astype(np.float64), final),
-        groups=tuple(names[code] if names else None for code in arrays["group"]),
-        reference=REFERENCE_DISTANCE["recorded" if recorded else "simulated"],
+    errors = errors + [
+        final_errors(arrays[published_name(name)].astype(np.float64), final)
+        for name in store.info.published
+    ]
+    groups = store.info.groups
+    labels = sorted({groups[code] for code in arrays["group"]}) if groups else [""]
+    places = [labels.index(groups[code] if groups else "") for code in arrays["group"]]
+    rows = np.arange(store.info.pushes) if store.rows is None else np.array(store.rows)
+    return measurements_of(
+        {name: np.stack([each[name][None] for each in errors]) for name in MEASURED},
+        travel_mm(arrays["initial"][..., :3].astype(np.float64), final),
+        _header(models, store, labels),
+        condition=np.array(places),
+        row=rows,
+    )
+
+
+def _header(models: Sequence[Model], store: Store, labels: Sequence[str]) -> Header:
+    published = store.info.published
+    kind = "recorded" if store.info.is_recorded else "simulated"
+    return Header(
+        models=(
+            *(model.id for model in models),
+            *(ModelId(kind="published", name=name) for name in published),
+        ),
+        predictions=tuple(published),
+        conditions=tuple(Condition(label=label) for label in labels),
+        reference_m=REFERENCE_DISTANCE[kind],
+        provenance=Provenance(
+            tests=tuple(TestSet(condition=c, data=store.content) for c in labels),
+            trainings=tuple(map(_training, filter(lambda m: m.card, models))),
+        ),
+    )
+
+
+def _training(model: Model) -> TrainingRun:
+    assert model.card is not None
+    card = model.card
+    return TrainingRun(
+        model=model.name,
+        seed=card.config.get("seed"),
+        weights=card.weights,
+        data=card.data,
+        iterations=card.config.get("iterations"),
+        final_loss=card.final_loss,
     )

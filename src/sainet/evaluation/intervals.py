@@ -40,6 +40,15 @@ def ratio_interval(
     return _interval(ratio(_mean(above), _mean(below)), drawn)
 
 
+def factor_interval(
+    above: Values, below: Values, folds: Folds | None = None
+) -> Interval:
+    """Return the ratio of the means of two models, trained apart, with its interval."""
+    floor = 1e-12
+    drawn = _resampled(above, folds) / np.maximum(_resampled(below, folds, 1), floor)
+    return _interval(_mean(above) / np.maximum(_mean(below), floor), drawn)
+
+
 def difference_interval(
     one: Values, other: Values, folds: Folds | None = None
 ) -> Interval:

@@ -1,67 +1,145 @@
-"""Errors of predicted pushes: the paper's three, and three that say more."""
+"""Errors of predicted pushes: what is measured of each push, and what tables show.
 
-from collections.abc import Sequence
+A new error is one entry of `MEASURED` if it is measured otherwise, and one `Metric`.
+"""
+
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sainet.evaluation.intervals import Folds, Interval, mean_interval, ratio_interval
+
 REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
+
+Errors = dict[str, np.ndarray]  # each [..., push, body], by the names in `MEASURED`
 
 
 @dataclass(frozen=True)
-class PushErrors:
-    """Errors of one model, for each push and body; maybe of several trainings."""
+class Offsets:
+    """Distances between predicted and true poses; zero where the truth is unknown."""
 
-    pos_mm: Float[np.ndarray, "... push body"]  # mean over the observed steps
-    rot_deg: Float[np.ndarray, "... push body"]  # mean over the observed steps
-    final_pos_mm: Float[np.ndarray, "... push body"]
-    final_rot_deg: Float[np.ndarray, "... push body"]
+    position_mm: Float[np.ndarray, "push time body"]
+    rotation_deg: Float[np.ndarray, "push time body"]
+    observed: Bool[np.ndarray, "push time"]
+
+    def mean(self, values: np.ndarray) -> Float[np.ndarray, "push body"]:
+        """Return the mean over the observed steps of each push; NaN without any."""
+        count = self.observed.sum(axis=1).astype(float)
+        summed = np.where(self.observed[..., None], values, 0.0).sum(axis=1)
+        return summed / np.where(count, count, np.nan)[:, None]
+
+    def last(self, values: np.ndarray) -> Float[np.ndarray, "push body"]:
+        """Return the value at the last observed step of each push; NaN without any."""
+        return _last(values, self.observed)
+
+
+MEASURED: Mapping[str, Callable[[Offsets], Float[np.ndarray, "push body"]]] = {
+    "pos_mm": lambda offsets: offsets.mean(offsets.position_mm),
+    "rot_deg": lambda offsets: offsets.mean(offsets.rotation_deg),
+    "final_pos_mm": lambda offsets: offsets.last(offsets.position_mm),
+    "final_rot_deg": lambda offsets: offsets.last(offsets.rotation_deg),
+}
+
+
+@dataclass(frozen=True)
+class ModelErrors:
+    """Errors of one model on the pushes of one condition, and what they relate to."""
+
+    errors: Errors
+    travel_mm: Float[np.ndarray, "push body"]
+    reference_m: float  # distance that trans (%) relates to
+    folds: Folds | None = None  # of each push, in a cross-validation
+
+    def mean(self, name: str, factor: float = 1.0) -> Interval:
+        """Return the mean of a measured error times a factor, with its interval."""
+        found = mean_interval(self.errors[name], self.folds)
+        return found if factor == 1.0 else _times(found, factor)
+
+    def per_travel(self, name: str) -> Interval:
+        """Return the mean of an error over the mean travel (%), with its interval."""
+        ratio = ratio_interval(self.errors[name], self.travel_mm, self.folds)
+        return _times(ratio, 100)
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number of a table: what it is called, and how it follows from the errors."""
+
+    key: str
+    name: str
+    unit: str
+    estimator: Callable[[ModelErrors], Interval]
+    digits: int = 2  # after the point
+    direction: Literal["less", "more"] = "less"  # is better
+    is_of_end: bool = False  # of the end of a push, not of all its steps
 
     @property
-    def trainings(self) -> int:
-        """How often the model was trained."""
-        return len(self.pos_mm) if self.pos_mm.ndim > 2 else 1  # noqa: PLR2004
-
-    def of_pushes(self, part: np.ndarray) -> "PushErrors":
-        """Return the errors of some pushes."""
-        return PushErrors(**{k: v[..., part, :] for k, v in vars(self).items()})
+    def heading(self) -> str:
+        """The name with its unit."""
+        return f"{self.name} ({self.unit})"
 
 
-def pooled(trainings: Sequence[PushErrors]) -> PushErrors:
-    """Return the errors of one model that was trained several times."""
-    names = vars(trainings[0])
-    return PushErrors(
-        **{name: np.stack([getattr(one, name) for one in trainings]) for name in names}
+def _mean(name: str) -> Callable[[ModelErrors], Interval]:
+    return lambda errors: errors.mean(name)
+
+
+# In the order of JSON; tables have an order of their own.
+METRICS = {
+    metric.key: metric
+    for metric in (
+        Metric("pos_mm", "pos", "mm", _mean("pos_mm")),
+        Metric("rot_deg", "rot", "deg", _mean("rot_deg")),
+        Metric(
+            "final_pos_mm", "final pos", "mm", _mean("final_pos_mm"), is_of_end=True
+        ),
+        Metric(
+            "final_rot_deg", "final rot", "deg", _mean("final_rot_deg"), is_of_end=True
+        ),
+        Metric(
+            "relative_percent",
+            "pos/travel",
+            "%",
+            lambda errors: errors.per_travel("final_pos_mm"),
+            digits=1,
+            is_of_end=True,
+        ),
+        Metric(
+            "trans_percent",
+            "trans",
+            "%",
+            lambda errors: errors.mean("pos_mm", 0.1 / errors.reference_m),
+        ),
     )
+}
 
 
 def push_errors(
     predicted: Float[np.ndarray, "push time body 3"],
     true: Float[np.ndarray, "push time body 3"],
     observed: Bool[np.ndarray, "push time"],
-) -> PushErrors:
+) -> Errors:
     """Return the errors of predicted poses (m, rad) where the true ones are known."""
     offset = predicted - np.where(observed[..., None, None], true, predicted)
-    position = 1000 * np.linalg.norm(offset[..., :2], axis=-1)
-    # An angle error is never more than half a turn.
-    rotation = np.abs(np.rad2deg(_wrap(offset[..., 2])))
-    return PushErrors(
-        pos_mm=_mean_over_time(position, observed),
-        rot_deg=_mean_over_time(rotation, observed),
-        final_pos_mm=_last(position, observed),
-        final_rot_deg=_last(rotation, observed),
+    offsets = Offsets(
+        position_mm=1000 * np.linalg.norm(offset[..., :2], axis=-1),
+        # An angle error is never more than half a turn.
+        rotation_deg=np.abs(np.rad2deg(_wrap(offset[..., 2]))),
+        observed=observed,
     )
+    return {name: measure(offsets) for name, measure in MEASURED.items()}
 
 
 def final_errors(
     predicted: Float[np.ndarray, "push body 3"], true: Float[np.ndarray, "push body 3"]
-) -> PushErrors:
+) -> Errors:
     """Return the errors of predicted final poses; the means over time are unknown."""
-    seen = np.ones((len(true), 1), bool)
-    ends = push_errors(predicted[:, None], true[:, None], seen)
-    unknown = np.full_like(ends.pos_mm, np.nan)
-    return PushErrors(unknown, unknown, ends.final_pos_mm, ends.final_rot_deg)
+    observed = np.ones((len(true), 1), bool)
+    ends = push_errors(predicted[:, None], true[:, None], observed)
+    known = {name for name, metric in METRICS.items() if metric.is_of_end}
+    return {k: v if k in known else np.full_like(v, np.nan) for k, v in ends.items()}
 
 
 def travel_mm(
@@ -78,17 +156,16 @@ def final_pose(
     return _last(pose, observed)
 
 
-def _mean_over_time(error: np.ndarray, observed: np.ndarray) -> np.ndarray:
-    count = observed.sum(axis=1).astype(float)
-    summed = np.where(observed[..., None], error, 0.0).sum(axis=1)
-    return summed / np.where(count, count, np.nan)[:, None]
-
-
 def _last(values: np.ndarray, observed: np.ndarray) -> np.ndarray:
-    """Return what belongs to the last observed step of each push, else NaN."""
+    """Return the value at the last observed step of each push, else NaN."""
     last = observed.shape[1] - 1 - np.argmax(observed[:, ::-1], axis=1)
-    seen = observed.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
-    return np.where(seen, values[np.arange(len(values)), last], np.nan)
+    is_known = observed.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
+    return np.where(is_known, values[np.arange(len(values)), last], np.nan)
+
+
+def _times(values: Interval, factor: float) -> Interval:
+    value, low, high = values
+    return factor * value, factor * low, factor * high
 
 
 def _wrap(angle: np.ndarray) -> np.ndarray:

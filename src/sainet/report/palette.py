@@ -9,6 +9,8 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from sainet.models.identity import ModelId, identity_named
+
 INK = "#2f3437"  # text, axes and the truth
 PAPER = "#ffffff"
 DARK_INK = "#e4e2dd"
@@ -21,8 +23,6 @@ _EPISODE = {
     "--other": (OTHER, "#9aa0a6"),
     "--target": (TARGET, "#d9b40a"),
 }
-# What a training of another form adds to a network's name, and to its label.
-_FORMS = {"-bystander": ", bystander", "-single-steps": ", single steps"}
 _LONGEST = 40  # characters of a label; of a longer name, a folder say, the end counts
 
 
@@ -108,7 +108,13 @@ def _spare_style(name: str, taken: set[int]) -> ModelStyle:
 
 
 def _spare_label(name: str) -> str:
-    for ending, told in _FORMS.items():
-        if name.removesuffix(ending) in _KNOWN and name.endswith(ending):
-            return _KNOWN[name.removesuffix(ending)].label + told
-    return name if len(name) <= _LONGEST else f"…{name[1 - _LONGEST :]}"
+    return _shortened(identity_named(name).label)
+
+
+def labels_of(models: Iterable[ModelId]) -> dict[str, str]:
+    """Return the label of each model by its slug."""
+    return {model.slug: _shortened(model.label) for model in models}
+
+
+def _shortened(label: str) -> str:
+    return label if len(label) <= _LONGEST else f"…{label[1 - _LONGEST :]}"

@@ -1,9 +1,12 @@
 """One module for each table or figure, published numbers beside ours, and the demo."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from sainet.runs.names import load_named
+
+if TYPE_CHECKING:
+    from sainet.studies.result import Result
 
 _TABLES = "sainet.studies.paper_tables"
 EXPERIMENTS = {
@@ -36,7 +39,7 @@ def needs_bullet(name: str) -> bool:
     return name not in (*_ON_BASE_INSTALL, *_RECORDED)
 
 
-def load_experiment(name: str) -> Callable[..., dict[str, Any]]:
+def load_experiment(name: str) -> Callable[..., "Result"]:
     """Return what makes the table of an experiment, given the scale and a `Chain`.
 
     Raises:

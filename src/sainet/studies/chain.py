@@ -5,24 +5,26 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import Store, open_store
-from sainet.evaluation.evaluate import Evaluation, evaluate
+from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.joining import pool_trainings
+from sainet.evaluation.measurements import Measurements
 from sainet.learning.fit import FitResult
 from sainet.learning.log import loss_note
 from sainet.learning.recipes import ModelKind, Recipe
+from sainet.models.identity import identity_named
 from sainet.models.library import PHYSICS, load_model
 from sainet.models.model import Model
-from sainet.runs.documents import write_json
+from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST, manifest
+from sainet.studies.result import TABLE, Result
 from sainet.studies.trainings import Training, train_at_once
 
-TABLE = "table.json"
 Advance = Callable[[int, str], None]
 Bar = Callable[[str, int], AbstractContextManager[Advance]]
 
@@ -110,13 +112,12 @@ class Chain:
         store: Store,
         *,
         engine: str = "planar",
-    ) -> Evaluation:
-        """Measure the errors of physics and of networks, each the mean of trainings."""
+    ) -> Measurements:
+        """Measure the errors of physics and of networks, each of several trainings."""
         networks = [name for names in trainings.values() for name in names]
         found = self.compare(self.models(networks, engine=engine), store)
-        for model, names in trainings.items():
-            found.pool(model, names)
-        return found
+        pools = {identity_named(name): names for name, names in trainings.items()}
+        return pool_trainings(found, pools)
 
     def recorded_pushes(self) -> Store:
         """Return the recorded pushes.
@@ -134,7 +135,7 @@ class Chain:
 
     def compare(
         self, models: list[Model], store: Store, *, steps: int | None = None
-    ) -> Evaluation:
+    ) -> Measurements:
         """Measure the errors of models on the same pushes; `steps` as of `evaluate`."""
         total = len(models) * store.info.pushes
         with self.bar("Predicting", total) as advance:
@@ -145,14 +146,16 @@ class Chain:
                 on_pushes=lambda model, pushes: advance(pushes, model),
             )
 
-    def finish(self, table: dict[str, Any]) -> dict[str, Any]:
-        """Write the table, and beside it by what it was made; returns it."""
+    def finish(self, result: Result, **measured: Measurements) -> Result:
+        """Write the result, its measurements and its origin; return the result."""
         recorded = self.recorded and open_store(self.recorded).content
         made = {"command": "reproduce", "experiment": self.out.name}
         write_json(self.out / CONFIG, made | {"recorded": recorded})
         write_json(self.out / MANIFEST, manifest())
-        write_json(self.out / TABLE, table)
-        return table
+        for name, each in measured.items():
+            each.write(self.out / f"{name.replace('_', '-')}.nc")
+        write_document(self.out / TABLE, result)
+        return result
 
     def models(
         self, networks: Sequence[str] = ("in", "sain"), *, engine: str = "planar"

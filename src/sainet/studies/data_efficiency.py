@@ -3,22 +3,34 @@
 from collections.abc import Sequence
 from typing import Any
 
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.joining import join
+from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import PAPER
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.paper_setup import PaperSetup, join, paper_setup
+from sainet.studies.paper_setup import PaperSetup, paper_setup
+from sainet.studies.result import Result
 
 PUSHES = {"quick": (50, 150, 500), "paper": (50, 150, 500, 1500, 4500)}
 SEEDS = {"quick": range(1), "paper": range(3)}
 OTHER_SEEDS = {"quick": range(1, 2), "paper": range(3, 8)}
 NETWORKS = ("in", "sain")
 AGAIN = 500  # pushes, with other seeds
-IN_FULL = "all, trained in full"
+AGAIN_CONDITION = Condition(
+    label=f"{AGAIN:,}, other trainings",
+    factors={"training_pushes": AGAIN, "seeds": "other"},
+)
+IN_FULL = Condition(
+    label="all, trained in full",
+    factors={"training_pushes": 4500, "iterations": "all"},
+)
 _SHORTER = 4
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Train IN and SAIN on ever more pushes of the robot setup; returns the table.
 
     Every size has a quarter of the iterations, so that what differs is the data: at the
@@ -30,22 +42,29 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
     setup = paper_setup("robot", scale, chain)
     tests = setup.test_pushes()
 
-    def table(group: str, seeds: Sequence[int], **recipe: Any) -> dict[str, Any]:  # noqa: ANN401
-        return setup.compare(setup.train(NETWORKS, seeds, **recipe), tests, group=group)
+    def measure(
+        condition: Condition,
+        seeds: Sequence[int],
+        **recipe: Any,  # noqa: ANN401
+    ) -> Measurements:
+        trainings = setup.train(NETWORKS, seeds, **recipe)
+        return setup.compare(trainings, tests, condition=condition)
 
     sizes = {pushes: _shorter(setup, pushes) for pushes in PUSHES[scale]}
-    tables = [table(f"{n:,}", SEEDS[scale], **sizes[n]) for n in sizes]
-    draw_data_efficiency(join(tables), chain.out / "data-efficiency.svg")
-    tables += [
-        table(again(), OTHER_SEEDS[scale], **sizes[AGAIN]),
-        table(IN_FULL, SEEDS[scale]),
+    parts = [measure(of_pushes(n), SEEDS[scale], **sizes[n]) for n in sizes]
+    parts += [
+        measure(AGAIN_CONDITION, OTHER_SEEDS[scale], **sizes[AGAIN]),
+        measure(IN_FULL, SEEDS[scale]),
     ]
-    return chain.finish(join(tables))
+    found = join(parts)
+    summary = summarise(found)
+    draw_data_efficiency(summary, chain.out / "data-efficiency.svg")
+    return chain.finish(Result(summary=summary), measurements=found)
 
 
-def again() -> str:
-    """Return what the group of further trainings is called."""
-    return f"{AGAIN:,}, other trainings"
+def of_pushes(count: int) -> Condition:
+    """Return the condition of a number of training pushes."""
+    return Condition(label=f"{count:,}", factors={"training_pushes": count})
 
 
 def _shorter(setup: PaperSetup, pushes: int) -> dict[str, Any]:

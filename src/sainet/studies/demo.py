@@ -11,19 +11,22 @@ from sainet.control.config import ControlConfig, Goals
 from sainet.control.trials import run_trials
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
-from sainet.evaluation.evaluate import PAPER_STEPS, Evaluation
+from sainet.evaluation.evaluate import PAPER_STEPS
+from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import PAPER
 from sainet.models.model import Model
 from sainet.report.episode_frames import outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report
 from sainet.report.replay import Replay
-from sainet.runs.documents import read_json, write_json
+from sainet.runs.documents import read_json, write_document
 from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST
 from sainet.studies.chain import Chain
 from sainet.studies.config import DemoConfig
 from sainet.studies.replays import build_replay, error_curves
+from sainet.studies.result import TABLE, Result
 
 _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with assumed \
 masses, radii and friction predicts such contacts badly (Physics); a network alone \
@@ -44,7 +47,7 @@ class DemoResult:
     """What the demo made."""
 
     report: Path
-    table: dict[str, Any]
+    summary: Summary
 
 
 def run_demo(config: DemoConfig, chain: Chain) -> DemoResult:
@@ -61,13 +64,15 @@ def run_demo(config: DemoConfig, chain: Chain) -> DemoResult:
     models = chain.models()
     chain.say("[bold]3[/] Comparing physics, IN and SAIN on pushes that none has seen.")
     evaluation = chain.compare(models, test)
-    table = evaluation.to_dict()
-    write_json(out / "table.json", table)
+    summary = summarise(evaluation)
+    evaluation.write(out / "measurements.nc")
+    write_document(out / TABLE, Result(summary=summary))
     chain.say("[bold]4[/] Pushing disk 2 to an easy and to a hard goal with SAIN.")
     episodes = [push_to_goal(chain, goals, config) for goals in GOALS]
     chain.say("[bold]5[/] Drawing the figures and the report.")
-    report = replace(_draw(models, test, evaluation, config, out), episodes=episodes)
-    return DemoResult(write_report(report, folder.path / REPORT), table)
+    report = _draw(models, test, evaluation, config, out)
+    report = replace(report, table=summary, episodes=episodes)
+    return DemoResult(write_report(report, folder.path / REPORT), summary)
 
 
 def push_to_goal(chain: Chain, goals: Goals, config: DemoConfig) -> dict[str, Any]:
@@ -112,7 +117,7 @@ def _simulate_and_train(chain: Chain, config: DemoConfig) -> Store:
 def _draw(
     models: list[Model],
     test: Store,
-    evaluation: Evaluation,
+    evaluation: Measurements,
     config: DemoConfig,
     out: Path,
 ) -> Report:
@@ -130,7 +135,6 @@ def _draw(
             iterations=config.iterations,
             paper=PAPER.optimiser.iterations,
         ),
-        table=evaluation.to_dict(),
         figures=(
             (paths, "The push of the replay: predicted paths against the true one."),
             (errors, "Mean position error of each disk over the time of a push."),
@@ -141,9 +145,11 @@ def _draw(
     )
 
 
-def _median_replay(models: list[Model], test: Store, evaluation: Evaluation) -> Replay:
+def _median_replay(
+    models: list[Model], test: Store, evaluation: Measurements
+) -> Replay:
     """Return the push on which physics is wrong by the median amount: no cherry."""
-    error = evaluation.errors["physics"].final_pos_mm.mean(axis=1)
+    error = evaluation.values("final_pos_mm", "physics").mean(axis=1)
     push = int(np.argsort(error)[len(error) // 2])
     return build_replay(
         models, test, push, title=f"Test push {push + 1}", steps=PAPER_STEPS

@@ -4,16 +4,18 @@ The ground truth is Bullet without noise; all engines have the true properties. 
 is not isotropic: its difference from itself is the best possible result.
 """
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
+import msgspec
 import numpy as np
 
 from sainet.datasets.config import GenerateConfig, Setup
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.joining import join
+from sainet.evaluation.summary import summarise
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
@@ -23,6 +25,7 @@ from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
+from sainet.studies.result import Result
 
 PUSHES = 200
 _SETUPS: tuple[Setup, ...] = ("robot", "direct-force")
@@ -72,18 +75,21 @@ def turn_controls(controls: Controls, angle: float) -> Controls:
     return eqx.tree_at(lambda c: (c.force, c.contact_offset), controls, turned)
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Return a table that compares the engines on 200 random pushes of each setup."""
     del scale  # both scales are equal
-    table: dict[str, Any] = {"rows": [], "comparisons": []}
+    parts = []
     for setup in _SETUPS:
         config = GenerateConfig(
             setup=setup, pushes=PUSHES, engine="bullet", noise_level="none", seed=2
         )
         store = chain.simulate(setup, config)
-        for row in chain.compare(_engines(), store).to_dict()["rows"]:
-            table["rows"].append(row | {"group": setup})
-    return chain.finish(table)
+        condition = Condition(label=setup, factors={"setup": setup})
+        parts.append(chain.compare(_engines(), store).in_condition(condition))
+    found = join(parts)
+    # Engines are compared with the truth, not with each other.
+    summary = msgspec.structs.replace(summarise(found), comparisons=())
+    return chain.finish(Result(summary=summary), measurements=found)
 
 
 def _engines() -> list[Model]:

@@ -7,12 +7,16 @@ from typing import Any
 import numpy as np
 
 from sainet.datasets.store import Store
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.joining import join
+from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.paper_setup import join
+from sainet.studies.result import Choice, Result
 from sainet.studies.surrogate import ROBOTS, Robot, recordings
 from sainet.studies.trainings import scaled
 
@@ -44,7 +48,7 @@ _TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
 _FEW = {"quick": 10, "paper": 25}
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Tune in every way that is considered, for every robot; returns the table.
 
     Returns:
@@ -52,25 +56,27 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         of each way: position and rotation errors over those of physics, their mean, by
         robot. `score` is the mean over the robots.
     """
-    tables, choices = [], []
+    parts: list[Measurements] = []
+    choices = []
     tuners = [_tuner(robot, scale, chain) for robot in ROBOTS]
     with_few = [each.with_few() for each in tuners]
     for several, ways in ((tuners, WAYS), (with_few, WAYS_WITH_FEW)):
         for start, change in ways:
             found = {each.robot: each.tune(start, change) for each in several}
-            tables += found.values()
-            scores = {name: _score(table["rows"]) for name, table in found.items()}
+            parts += found.values()
+            scores = {name: _score(summarise(each)) for name, each in found.items()}
             choices.append(
-                {
-                    "pushes": several[0].training.info.pushes,
-                    "start": start,
-                    "change": change,
-                    "score": float(np.mean([*scores.values()])),
-                    "scores": scores,
-                }
+                Choice(
+                    pushes=several[0].training.info.pushes,
+                    start=start,
+                    change={**change},
+                    score=float(np.mean([*scores.values()])),
+                    scores=scores,
+                )
             )
-    table = join(tables) | {"choices": choices}
-    return chain.finish(table)
+    found = join(parts)
+    result = Result(summary=summarise(found), choices=tuple(choices))
+    return chain.finish(result, measurements=found)
 
 
 @dataclass(frozen=True)
@@ -87,8 +93,8 @@ class _Tuner:
         """Return what tunes on the first of the recordings alone."""
         return replace(self, training=self.training.first(_FEW[self.scale]))
 
-    def tune(self, start: str, change: Change) -> dict[str, Any]:
-        """Return the table of the tests."""
+    def tune(self, start: str, change: Change) -> Measurements:
+        """Measure the tests."""
         pushes = self.training.info.pushes
         recipe = recipe_for(start_named(start)).changed(**change)
         way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
@@ -99,10 +105,9 @@ class _Tuner:
             load_model(str(result.folder)), id=ModelId(kind="sain", name="sain-tuned")
         )
         models = [load_model("physics"), tuned]
-        found = self.chain.compare(models, self.tests, steps=0).to_dict()
-        for row in (*found["rows"], *found["comparisons"]):
-            row["group"] = name
-        return found
+        found = self.chain.compare(models, self.tests, steps=0)
+        factors = {"robot": self.robot, "training_pushes": pushes, "start": start}
+        return found.in_condition(Condition(label=name, factors=factors))
 
 
 def _tuner(robot: Robot, scale: Scale, chain: Chain) -> _Tuner:
@@ -111,9 +116,9 @@ def _tuner(robot: Robot, scale: Scale, chain: Chain) -> _Tuner:
     return _Tuner(robot.name, training, tests, scale, chain)
 
 
-def _score(rows: list[dict[str, Any]]) -> float:
-    errors = {
-        row["model"]: np.array([row["final_pos_mm"], row["final_rot_deg"]])
-        for row in rows
-    }
-    return float(np.mean(errors["sain-tuned"] / errors["physics"]))
+def _score(summary: Summary) -> float:
+    tuned, physics = (
+        np.array([summary.errors(m, k) for k in ("final_pos_mm", "final_rot_deg")])
+        for m in ("sain-tuned", "physics")
+    )
+    return float(np.mean(tuned / physics))

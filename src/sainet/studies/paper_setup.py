@@ -11,6 +11,8 @@ from typing import Any
 from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig, Setup
 from sainet.datasets.store import Store
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Measurements
 from sainet.learning.recipes import FINE_TUNING, PAPER, FromModel, Recipe
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
@@ -131,15 +133,11 @@ class PaperSetup:
         trainings: Mapping[str, Sequence[str]],
         tests: Store,
         *,
-        group: str | None = None,
-    ) -> dict[str, Any]:
-        """Return the table of physics (Bullet) and networks, of one group if named."""
-        table = self.chain.compare_trainings(trainings, tests, engine="bullet")
-        found = table.to_dict()
-        if group is not None:
-            for row in (*found["rows"], *found["comparisons"]):
-                row["group"] = group
-        return found
+        condition: Condition | None = None,
+    ) -> Measurements:
+        """Measure physics (Bullet) and networks, in one condition if it is given."""
+        found = self.chain.compare_trainings(trainings, tests, engine="bullet")
+        return found if condition is None else found.in_condition(condition)
 
     def _simulate(self, name: str, pushes: int, **changes: Any) -> Store:  # noqa: ANN401
         config = GenerateConfig(
@@ -161,11 +159,3 @@ def paper_setup(setup: Setup, scale: Scale, chain: Chain) -> PaperSetup:
     """Return a setup whose folder lies beside that of the experiment."""
     shared = replace(chain, out=chain.out.parent / f"{setup}-{scale}")
     return PaperSetup(setup, scale, shared)
-
-
-def join(tables: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return one table of the rows and comparisons of several."""
-    return {
-        part: [row for table in tables for row in table[part]]
-        for part in ("rows", "comparisons")
-    }

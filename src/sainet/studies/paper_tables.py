@@ -6,11 +6,13 @@ and planar with the true masses and radii (what a user who knows the disks would
 Table II has the networks a second time, after they have met a bystander.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+
+import msgspec
 
 from sainet.datasets.config import Setup
+from sainet.evaluation.conditions import PublishedValues
+from sainet.evaluation.summary import summarise
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.paper_setup import BYSTANDER, NETWORKS, paper_setup, with_form
@@ -18,8 +20,8 @@ from sainet.studies.published import (
     DIRECT_FORCE_THREE_DISKS,
     DIRECT_FORCE_TWO_DISKS,
     ROBOT_TWO_DISKS,
-    published_rows,
 )
+from sainet.studies.result import Result
 
 TRAINED_DISKS = 2
 BESIDE = NETWORKS  # what meets a bystander before it meets three disks
@@ -32,17 +34,17 @@ class PaperTable:
 
     setup: Setup
     disks: int
-    published: Mapping[str, Any]
+    published: tuple[PublishedValues, ...]
 
 
-def direct_force_two_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
+def direct_force_two_disks(scale: Scale, chain: Chain) -> Result:
     """Make Table I again."""
     return make_table(
         PaperTable("direct-force", 2, DIRECT_FORCE_TWO_DISKS), scale, chain
     )
 
 
-def direct_force_three_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
+def direct_force_three_disks(scale: Scale, chain: Chain) -> Result:
     """Make Table II again: the networks of Table I on scenes of three disks.
 
     And networks that went on from them beside a bystander, for in two-disk pushes no
@@ -53,12 +55,12 @@ def direct_force_three_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
     )
 
 
-def robot_two_disks(scale: Scale, chain: Chain) -> dict[str, Any]:
+def robot_two_disks(scale: Scale, chain: Chain) -> Result:
     """Make Table III again."""
     return make_table(PaperTable("robot", 2, ROBOT_TWO_DISKS), scale, chain)
 
 
-def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
+def make_table(table: PaperTable, scale: Scale, chain: Chain) -> Result:
     """Simulate, train and compare.
 
     Args:
@@ -73,8 +75,11 @@ def make_table(table: PaperTable, scale: Scale, chain: Chain) -> dict[str, Any]:
     if more_disks:
         beside = setup.train_beside_bystander(BESIDE, SEEDS[scale])
         trainings |= {with_form(name, BYSTANDER): beside[name] for name in BESIDE}
-    result = setup.compare(trainings, tests)
+    found = setup.compare(trainings, tests).with_published(table.published)
+    measured = {"measurements": found}
+    result = Result(summary=summarise(found))
     if more_disks:
-        result["as_trained"] = setup.compare(trainings, setup.test_pushes())
-    result["published"] = published_rows(table.published)
-    return chain.finish(result)
+        found = setup.compare(trainings, setup.test_pushes())
+        measured["as_trained"] = found
+        result = msgspec.structs.replace(result, as_trained=summarise(found))
+    return chain.finish(result, **measured)

@@ -4,20 +4,20 @@ The smaller sets are parts of the greater ones. A surface with fewer pushes than
 asks for gives all that it has.
 """
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
 from sainet.evaluation.folds import join_folds
+from sainet.evaluation.joining import join
+from sainet.evaluation.summary import summarise
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.paper_setup import join
+from sainet.studies.data_efficiency import of_pushes
 from sainet.studies.recorded_models import Tuner, Variant, surfaces_of
-from sainet.studies.recorded_pushes import FOLDS, told
+from sainet.studies.recorded_pushes import FOLDS, TOLD
+from sainet.studies.result import Result
 
 PUSHES = {"quick": (10, 20), "paper": (25, 50, 100, 200, 400)}
 VARIANTS = (
@@ -28,7 +28,7 @@ VARIANTS = (
 )
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Tune on ever more recorded pushes; returns the table.
 
     Its groups are numbers of training pushes, over all surfaces together.
@@ -37,7 +37,7 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         BadInput: no recorded pushes were given.
     """
     store = chain.recorded_pushes()
-    tables = []
+    sizes = []
     for pushes in PUSHES[scale]:
         parts = []
         for surface, rows in surfaces_of(store).items():
@@ -46,14 +46,12 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
                 tuner = Tuner(_first(fold, pushes), folder, scale, chain)
                 models = [*tuner.physics(), *tuner.models(VARIANTS)]
                 parts.append((fold, chain.compare(models, fold.tests)))
-        whole = join_folds(parts)
-        groups = (f"{pushes:,}",) * len(whole.groups)
-        tables.append(told(replace(whole, groups=groups)))
-    table = join(tables)
-    table["published"] = [row for one in tables for row in one["published"]]
-    chain.finish(table)
-    draw_data_efficiency(table, chain.out / "recorded-data-efficiency.svg")
-    return table
+        sizes.append(join_folds(parts).in_condition(of_pushes(pushes)))
+    found = join(sizes)
+    summary = summarise(found, subject=TOLD)
+    chain.finish(Result(summary=summary), measurements=found)
+    draw_data_efficiency(summary, chain.out / "recorded-data-efficiency.svg")
+    return Result(summary=summary)
 
 
 def _first(fold: Fold, pushes: int) -> Store:

@@ -9,22 +9,23 @@ them loses is said beside it.
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
-from sainet.evaluation.evaluate import Evaluation
+from sainet.evaluation.conditions import Condition
 from sainet.evaluation.folds import join_folds
+from sainet.evaluation.joining import add_models, join, without_predictions
+from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.offsets import EndOffsets, end_offsets
-from sainet.evaluation.rows import comparison_rows
+from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import Features, ModelKind
 from sainet.report.figures.engine_errors import draw_engine_errors
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.paper_setup import join
 from sainet.studies.recorded_models import Inside, Learned, Tuner, Variant, surfaces_of
+from sainet.studies.result import Result
 
 FOLDS = {"quick": 2, "paper": 5}
 NETWORKS: tuple[tuple[ModelKind, Inside], ...] = (
@@ -59,7 +60,7 @@ FEW = 50  # pushes of a surface that a network was not made for
 _EVERYWHERE, _FROM, _TO = "all", "abs", "plywood"
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Tune, train and identify on each fold; returns the table.
 
     Args:
@@ -83,14 +84,13 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
             for fold in make_folds(store, FOLDS[scale])
         ]
     )
-    whole = replace(whole, errors=whole.errors | for_all.errors)
-    tables = [*_tables(whole, store), *_elsewhere(store, scale, chain)]
-    table = join(tables)
-    table["published"] = [row for one in tables for row in one.get("published", ())]
-    chain.finish(table)
+    whole = _with_surfaces(add_models(whole, without_predictions(for_all)), store)
+    found = join([whole, *_elsewhere(store, scale, chain)])
+    result = Result(summary=summarise(found, subject=TOLD))
+    chain.finish(result, measurements=found)
     cases = dict(_engine_errors(store, scale, chain))
     draw_engine_errors(cases, chain.out / "engine-errors.svg")
-    return table
+    return result
 
 
 def _engine_errors(
@@ -104,13 +104,13 @@ def _engine_errors(
             yield f"{surface}{engine}", end_offsets(model, pushes)
 
 
-def _by_surface(fold: Fold, surface: str, scale: Scale, chain: Chain) -> Evaluation:
+def _by_surface(fold: Fold, surface: str, scale: Scale, chain: Chain) -> Measurements:
     """Return the errors of models that were made for one surface."""
     tuner = Tuner(fold.training, f"{surface}/fold-{fold.number}", scale, chain)
     return chain.compare([*tuner.physics(), *tuner.models(VARIANTS)], fold.tests)
 
 
-def _for_all(fold: Fold, scale: Scale, chain: Chain) -> Evaluation:
+def _for_all(fold: Fold, scale: Scale, chain: Chain) -> Measurements:
     """Return the errors of models that were made for all surfaces at once."""
     tuner = Tuner(fold.training, f"every-surface/fold-{fold.number}", scale, chain)
     models = [
@@ -119,37 +119,19 @@ def _for_all(fold: Fold, scale: Scale, chain: Chain) -> Evaluation:
     return chain.compare(models, fold.tests)
 
 
-def _tables(whole: Evaluation, store: Store) -> Iterator[dict[str, Any]]:
-    """Yield the table of each surface and that over all."""
-    surfaces = np.empty(store.info.pushes, object)
-    for surface, rows in surfaces_of(store).items():
-        surfaces[rows] = surface
-    for groups in (tuple(surfaces), (_EVERYWHERE,) * store.info.pushes):
-        yield told(replace(whole, groups=groups))
+def _with_surfaces(whole: Measurements, store: Store) -> Measurements:
+    """Return measurements with a condition for each surface, and one for all."""
+    surfaces = surfaces_of(store)
+    names = sorted(surfaces)
+    places = np.empty(store.info.pushes, np.int32)
+    for name, rows in surfaces.items():
+        places[rows] = names.index(name)
+    conditions = [Condition(label=name, factors={"surface": name}) for name in names]
+    everywhere = Condition(label=_EVERYWHERE, parts=tuple(names))
+    return whole.in_conditions((*conditions, everywhere), places)
 
 
-def told(evaluation: Evaluation) -> dict[str, Any]:
-    """Return the table, each model and published one compared with one alone."""
-    found = evaluation.to_dict()
-    every = evaluation.errors | evaluation.published
-    groups = np.array(evaluation.groups)
-    found["comparisons"] = [
-        row
-        for group in dict.fromkeys(evaluation.groups)
-        for name, errors in every.items()
-        if name != TOLD
-        for row in comparison_rows(
-            (TOLD, every[TOLD].of_pushes(groups == group)),
-            (name, errors.of_pushes(groups == group)),
-            group=group,
-            folds=evaluation.folds_of(groups == group),
-        )
-        if row["metric"].startswith("final")  # ends alone were observed
-    ]
-    return found
-
-
-def _elsewhere(store: Store, scale: Scale, chain: Chain) -> Iterator[dict[str, Any]]:
+def _elsewhere(store: Store, scale: Scale, chain: Chain) -> Iterator[Measurements]:
     """Yield what models of one surface do on another: without any push of it, with few.
 
     Both are tested on the same pushes, those that neither has seen.
@@ -163,8 +145,9 @@ def _elsewhere(store: Store, scale: Scale, chain: Chain) -> Iterator[dict[str, A
         tuner = Tuner(store.take(rows), folder, scale, chain)
         models = [*tuner.physics(), *tuner.models(ELSEWHERE)]
         found = chain.compare(models, store.take(tests))
-        group = f"{_FROM} to {_TO}, {count} of it"
-        yield told(_named(found, group))
+        label = f"{_FROM} to {_TO}, {count} of it"
+        factors = {"surface": _TO, "trained_on": _FROM, "training_pushes": count}
+        yield found.in_condition(Condition(label=label, factors=factors))
 
 
 def _few(store: Store, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -174,8 +157,3 @@ def _few(store: Store, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     few = order[: min(FEW, len(rows) // 2)]
     seen = np.isin(repeats, repeats[few])
     return rows[few], rows[~seen]
-
-
-def _named(evaluation: Evaluation, group: str) -> Evaluation:
-    count = len(evaluation.groups)
-    return replace(evaluation, groups=(group,) * count)

@@ -3,13 +3,13 @@
 The paper's Table III has Bullet for both; this is the same table on the base install.
 """
 
-from typing import Any
-
 from sainet.datasets.config import GenerateConfig
+from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import PAPER, ModelKind
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.published import ROBOT_TWO_DISKS, published_rows
+from sainet.studies.published import ROBOT_TWO_DISKS
+from sainet.studies.result import Result
 from sainet.studies.trainings import Training
 
 _SIZES = {"quick": (1000, 200, 500), "paper": (4500, 500, 10_000)}
@@ -17,7 +17,7 @@ _SEEDS = {"quick": (0,), "paper": (0, 1, 2)}
 _MODELS: tuple[ModelKind, ...] = ("in", "sain")
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Simulate, train IN and SAIN, and compare them; returns the table.
 
     Args:
@@ -34,6 +34,5 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
         for model in _MODELS
     }
     made = chain.train_seeds(trainings, _SEEDS[scale])
-    table = chain.compare_trainings(made, test).to_dict()
-    table["published"] = published_rows(ROBOT_TWO_DISKS)
-    return chain.finish(table)
+    found = chain.compare_trainings(made, test).with_published(ROBOT_TWO_DISKS)
+    return chain.finish(Result(summary=summarise(found)), measurements=found)

@@ -1,18 +1,21 @@
 """Robustness to wrong properties and unseen conditions."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.derive import derive
 from sainet.datasets.store import Store
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.joining import join
+from sainet.evaluation.summary import summarise
 from sainet.scenes.geometry import wrap_angle
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.paper_setup import NETWORKS, PaperSetup, join, paper_setup
+from sainet.studies.paper_setup import NETWORKS, PaperSetup, paper_setup
 from sainet.studies.paper_tables import SEEDS
+from sainet.studies.result import Result
 
 PERCENT_WRONG = (2, 5, 10)
 SPEEDS_MM_S = (25.0, 100.0)
@@ -22,30 +25,35 @@ CONTACT_DEG, DIRECTION_DEG = 75.0, 45.0
 _SEED = 11
 
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+def run(scale: Scale, chain: Chain) -> Result:
     """Return a table of the networks of Table III on unseen conditions."""
     setup = paper_setup("robot", scale, chain)
     trainings = setup.train(NETWORKS, SEEDS[scale])
-    table = join(
+    found = join(
         [
-            setup.compare(trainings, tests, group=group)
-            for group, tests in _test_sets(setup)
+            setup.compare(trainings, tests, condition=condition)
+            for condition, tests in _test_sets(setup)
         ]
     )
-    return chain.finish(table)
+    return chain.finish(Result(summary=summarise(found)), measurements=found)
 
 
-def _test_sets(setup: PaperSetup) -> Iterator[tuple[str, Store]]:
+def _test_sets(setup: PaperSetup) -> Iterator[tuple[Condition, Store]]:
+    def condition(label: str, **factors: float | str) -> Condition:
+        return Condition(label=label, factors=factors)
+
     usual = setup.test_pushes()
-    yield "as trained", usual
+    yield condition("as trained"), usual
     for percent in PERCENT_WRONG:
-        yield f"properties ±{percent} %", _misread(setup, usual, percent)
-    yield "angles outside", _outside_angles(setup)
+        named = condition(f"properties ±{percent} %", percent_wrong=percent)
+        yield named, _misread(setup, usual, percent)
+    yield condition("angles outside", angles="outside"), _outside_angles(setup)
     for speed in SPEEDS_MM_S:
+        named = condition(f"{speed:g} mm/s", speed_mm_s=speed)
         name = f"test-{speed:g}-mm-s"
-        yield f"{speed:g} mm/s", setup.test_pushes(name, speed_mm_s=(speed,))
-    name = f"test-{GAP_MM:g}-mm-apart"
-    yield f"{GAP_MM:g} mm apart", setup.test_pushes(name, gap_mm=GAP_MM)
+        yield named, setup.test_pushes(name, speed_mm_s=(speed,))
+    named = condition(f"{GAP_MM:g} mm apart", gap_mm=GAP_MM)
+    yield named, setup.test_pushes(f"test-{GAP_MM:g}-mm-apart", gap_mm=GAP_MM)
 
 
 def _misread(setup: PaperSetup, usual: Store, percent: int) -> Store:

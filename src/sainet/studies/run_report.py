@@ -11,11 +11,11 @@ from sainet.models.card import CARD, read_card
 from sainet.models.identified import FILE as IDENTIFIED
 from sainet.models.identified import Identified, read_identified
 from sainet.report.pages.page import REPORT, Report, to_page
-from sainet.runs.documents import read_json
+from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST
-from sainet.studies.chain import TABLE
+from sainet.studies.result import TABLE, Result
 
 _EPISODES = 6  # that play
 # The figures that commands leave in their folders, and what one sees there.
@@ -39,7 +39,8 @@ def report_of(folder: Path) -> Report:
     """
     if not folder.is_dir():
         raise BadInput(f"{folder}: no such folder; give one that sainet made.")
-    table = _json(folder / TABLE)
+    found = folder / TABLE
+    table = read_document(found, Result).summary if found.is_file() else None
     card = msgspec.to_builtins(read_card(folder)) if (folder / CARD).is_file() else {}
     is_identified = (folder / IDENTIFIED).is_file()
     said = _estimates(read_identified(folder)) if is_identified else ()
@@ -52,9 +53,9 @@ def report_of(folder: Path) -> Report:
     command = settings.get("command")
     return Report(
         title=folder.resolve().name,
-        subtitle=f"What 'sainet {command}' left there" if command else "",
+        subtitle=f"Output of 'sainet {command}'" if command else "",
         summary="\n\n".join(said),
-        table=table or None,
+        table=table,
         figures=figures,
         episodes=episodes,
         manifest=settings | made,

@@ -7,15 +7,19 @@ shipped ones.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Any
 
 from sainet.control.config import ControlConfig
-from sainet.control.summary import MEASURES, paired_test, summarise
+from sainet.control.measure import measure_trials
 from sainet.control.trials import run_trials
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.joining import join
+from sainet.evaluation.summary import summarise
+from sainet.models.identity import identity_named
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.published import SIMULATED_CONTROL
+from sainet.studies.result import Result
 
 TRIALS = {"quick": 4, "paper": 100}
 MODELS = ("physics", "physics-true", "in", "sain")
@@ -30,8 +34,15 @@ class Group:
     name: str
     config: ControlConfig
 
+    @property
+    def condition(self) -> Condition:
+        """The condition that its trials belong to."""
+        names = ("world", "goals", "planner", "knows", "disks")
+        factors = {name: getattr(self.config, name) for name in names}
+        return Condition(label=self.name, factors=factors)
 
-def run(scale: Scale, chain: Chain) -> dict[str, Any]:
+
+def run(scale: Scale, chain: Chain) -> Result:
     """Return the table of all models and conditions.
 
     Args:
@@ -39,22 +50,14 @@ def run(scale: Scale, chain: Chain) -> dict[str, Any]:
             50 goals each with assumed properties and with a row of three disks.
         chain: runs the steps; finished episodes in its folder are kept.
     """
-    rows, pairs = [], []
+    parts = []
     for group in groups(TRIALS[scale]):
-        records = {model: _trials(group, model, chain) for model in MODELS}
-        named = {"group": group.name, "world": group.config.world}
-        rows += [
-            {**named, "model": model, **summarise(found)}
-            for model, found in records.items()
-        ]
-        pairs += [
-            {**named, "measure": measure, "model": other, "against": one}
-            | paired_test(records[other], records[one], measure)
-            for measure in MEASURES
-            for one, other in combinations(MODELS, 2)
-        ]
-    table = {"rows": rows, "pairs": pairs, "published": list(SIMULATED_CONTROL)}
-    return chain.finish(table)
+        records = {
+            identity_named(model): _trials(group, model, chain) for model in MODELS
+        }
+        parts.append(measure_trials(records, group.condition))
+    found = join(parts).with_published(SIMULATED_CONTROL)
+    return chain.finish(Result(summary=summarise(found)), measurements=found)
 
 
 def groups(trials: int) -> Iterator[Group]:

@@ -1,13 +1,13 @@
 """The figure of data efficiency: error against the number of training pushes."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
+from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.report.figures.canvas import (
     add_grid,
     house_look,
@@ -18,31 +18,48 @@ from sainet.report.figures.canvas import (
 )
 from sainet.report.palette import ModelStyle, styles_of
 
-_Row = Mapping[str, Any]
+FACTOR = "training_pushes"
 _METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
 _WIDE = 4  # ratio of errors from which a scale is logarithmic
 
 
-def draw_data_efficiency(table: Mapping[str, Any], path: Path) -> Path:
+class _Row(NamedTuple):
+    """The errors of one model on one disk after training on so many pushes."""
+
+    pushes: int
+    row: Row
+
+
+def draw_data_efficiency(summary: Summary, path: Path) -> Path:
     """Draw each model's mean errors over the pushes that it was trained on.
 
     Of position and rotation, a panel for each disk. Bands are 95 % intervals. A model
-    that is the same whatever the pushes, physics say, becomes a level line.
+    that does not depend on them, such as physics, becomes a level line.
 
     Args:
-        table: its rows' groups are numbers of training pushes: ``1,500``.
+        summary: of conditions that differ in the number of training pushes and in
+            nothing else; others are left out.
         path: where to write; ``.svg`` or ``.png``.
     """
-    rows = list(table["rows"])
-    styles = styles_of(str(row["model"]) for row in rows)
-    bodies = sorted({int(row["body"]) for row in rows})
+    sizes = {
+        condition.label: int(condition.factors[FACTOR])
+        for condition in summary.conditions
+        if condition.factors.keys() == {FACTOR}
+    }
+    rows = [
+        _Row(sizes[row.condition], row)
+        for row in summary.rows
+        if row.condition in sizes
+    ]
+    styles = styles_of(each.row.model for each in rows)
+    bodies = sorted({each.row.body for each in rows})
     cases = [(metric, body) for metric in _METRICS for body in bodies]
     down, across = (1, 2) if len(bodies) == 1 else (2, len(bodies))
     with house_look():
         figure = new_figure(1.4 + 4.1 * across, 3.3 * down)
         panels = list(figure.subplots(down, across).flat)
         for (metric, body), axes in zip(cases, panels, strict=True):
-            _set_axes(axes, sorted({_pushes(row) for row in rows}))
+            _set_axes(axes, sorted(sizes.values()))
             axes.set_title(f"Disk {body}")
             axes.set_ylabel(f"mean {_METRICS[metric]}")
             for name, style in styles.items():
@@ -55,24 +72,26 @@ def draw_data_efficiency(table: Mapping[str, Any], path: Path) -> Path:
         return save(figure, path)
 
 
-def _pushes(row: _Row) -> int:
-    return int(str(row["group"]).replace(",", ""))
-
-
 def _of(rows: list[_Row], model: str, body: int) -> list[_Row]:
     """Return the rows of one line, from few pushes to many."""
-    found = [row for row in rows if row["model"] == model and row["body"] == body]
-    return sorted(found, key=_pushes)
+    found = [each for each in rows if (each.row.model, each.row.body) == (model, body)]
+    return sorted(found, key=lambda each: each.pushes)
 
 
 def _end(rows: list[_Row], metric: str) -> tuple[float, float]:
-    return _pushes(rows[-1]), float(rows[-1][metric])
+    last = rows[-1]
+    return last.pushes, _estimate(last.row, metric).value or 0.0
+
+
+def _estimate(row: Row, metric: str) -> Estimate:
+    """Return the mean over a push; the error of its end where only that is known."""
+    return row.values.get(metric) or row.values[f"final_{metric}"]
 
 
 def _draw_model(axes: Axes, style: ModelStyle, rows: list[_Row], metric: str) -> None:
-    pushes = [_pushes(row) for row in rows]
-    error = np.array([row[metric] for row in rows], float)
-    low, high = np.array([row[f"{metric}_interval"] for row in rows], float).T
+    pushes = [each.pushes for each in rows]
+    found = [_estimate(each.row, metric) for each in rows]
+    error, low, high = np.array([(e.value, e.low, e.high) for e in found], float).T
     learns = np.ptp(error) > 0
     marker = {"marker": "o", "markersize": 3.5} if learns else {}
     axes.plot(pushes, error, **line_look(style, 1.6 if learns else 1.0), **marker)

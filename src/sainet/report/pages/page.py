@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from sainet.report.control_table import control_html, is_control
+from sainet.evaluation.summary import Summary
+from sainet.report.arrange import arrange
 from sainet.report.episode_frames import episode_data
 from sainet.report.pages.svg import inline_svg, read_svg
 from sainet.report.pages.templates import read, render
 from sainet.report.palette import css_variables, styles_of
 from sainet.report.replay import Replay, Track
-from sainet.report.tables import to_html
+from sainet.report.writers import to_html
 from sainet.runs.documents import write_bytes
 
 REPORT = "report.html"
@@ -32,8 +33,7 @@ class Report:
     title: str
     subtitle: str = ""
     summary: str = ""  # plain text, paragraphs parted by empty lines
-    # The result of `sainet evaluate --json`, or the table of an experiment.
-    table: Mapping[str, Any] | None = None
+    table: Summary | None = None
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
     replays: Sequence[Replay] = ()
@@ -56,8 +56,8 @@ def to_page(report: Report) -> str:
         paragraphs=[text for text in re.split(r"\n\s*\n", report.summary) if text],
         replays=[replay_data(replay) for replay in report.replays],
         episodes=[episode_data(record) for record in report.episodes],
-        table=Markup(_table(report.table)) if report.table else "",
-        is_control=bool(report.table) and is_control(report.table),
+        table=Markup(to_html(arrange(report.table))) if report.table else "",
+        is_of_trials=report.table is not None and report.table.is_of_trials,
         figures=list(_pictures(report.figures)),
         manifest=list(_flatten(report.manifest)),
         light=css_variables(dark=False),
@@ -65,10 +65,6 @@ def to_page(report: Report) -> str:
         css=Markup(read("report.css")),
         script=Markup('"use strict";\n' + "\n".join(map(read, _SCRIPTS))),
     )
-
-
-def _table(table: Mapping[str, Any]) -> str:
-    return control_html(table) if is_control(table) else to_html(table)
 
 
 def replay_data(replay: Replay) -> dict[str, Any]:

@@ -1,0 +1,216 @@
+"""Measurements: errors of models per push, and results of control trials.
+
+One xarray dataset with the dimensions model, training, sample (a push or a trial) and
+body; models with fewer training runs are padded with NaN. Its header, a JSON document,
+names the models, the conditions and the provenance.
+"""
+
+import io
+import lzma
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import xarray as xr
+
+from sainet.evaluation.conditions import Condition, Header, PublishedValues
+from sainet.runs.documents import read_file, write_bytes
+from sainet.runs.errors import BadInput
+
+PUSHES, TRIALS = ("model", "training", "sample", "body"), ("model", "sample")
+DIMENSIONS = {
+    **dict.fromkeys(("pos_mm", "rot_deg", "final_pos_mm", "final_rot_deg"), PUSHES),
+    **dict.fromkeys(("solved", "ended", "pushes", "final_mm"), TRIALS),
+    "travel_mm": ("sample", "body"),
+    "decision_s": ("model", "sample", "decision"),
+    "condition": ("sample",),
+    "fold": ("sample",),  # -1 where pushes are not cross-validated
+    "row": ("sample",),  # of the push in its dataset, or number of the trial
+}
+_COORDINATES = ("condition", "fold", "row")
+_LARGEST = 256 << 20  # bytes of a file, once it is unpacked
+_HEADER = "header"
+_BITS = 14  # of the mantissa, in published measurements: a relative error below 1e-4
+# Values of four bytes: the byte that a value has at its place predicts the next one.
+_FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 9, "lc": 0, "lp": 2, "pb": 2}]
+_REMEDY = "give a file of measurements that sainet wrote"
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """A checked dataset of errors or trials, with the identities behind it."""
+
+    data: xr.Dataset
+    header: Header
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` if dataset and header do not agree."""
+        for name, variable in self.data.variables.items():
+            wanted = DIMENSIONS.get(str(name))
+            if wanted is None:
+                wanted = PUSHES  # an error that somebody added
+            if variable.dims != wanted:
+                raise ValueError(f"{name} has dimensions {variable.dims}, not {wanted}")
+        sizes = self.data.sizes
+        models = [model.slug for model in self.header.models]
+        if len(set(models)) < len(models) or sizes.get("model", 0) != len(models):
+            raise ValueError(f"{sizes.get('model')} models are named {models}")
+        missing = set(_COORDINATES) - {str(name) for name in self.data.variables}
+        if missing:
+            raise ValueError(f"{sorted(missing)[0]} is missing")
+        places = self.data["condition"].values
+        known = len(self.header.conditions)
+        if len(places) == 0 or places.min() < 0 or places.max() >= known:
+            raise ValueError(f"condition must be below {known} at every sample")
+
+    @property
+    def slugs(self) -> list[str]:
+        """The slugs of the models, in order."""
+        return [model.slug for model in self.header.models]
+
+    @property
+    def error_names(self) -> list[str]:
+        """The measured errors of pushes; empty for trials."""
+        return [str(k) for k, v in self.data.data_vars.items() if v.dims == PUSHES]
+
+    @property
+    def is_of_trials(self) -> bool:
+        """Whether samples are control trials, not pushes."""
+        return "solved" in self.data
+
+    @cached_property
+    def _places(self) -> dict[str, list[int]]:
+        numbers = {c.label: n for n, c in enumerate(self.header.conditions)}
+        return {
+            c.label: [numbers[c.label], *(numbers[part] for part in c.parts)]
+            for c in self.header.conditions
+        }
+
+    def samples_of(self, condition: Condition) -> np.ndarray:
+        """Return which samples belong to a condition, or to one of its parts."""
+        return np.isin(self.data["condition"].values, self._places[condition.label])
+
+    def values(self, name: str, model: str) -> np.ndarray:
+        """Return one variable of a model: without padding, ``[training, ...]``.
+
+        A model without several training runs has no axis for them.
+        """
+        found = self.data[name].values[self.slugs.index(model)]
+        if self.data[name].dims != PUSHES:
+            return found
+        trained = max(int(np.isfinite(found).any(axis=(1, 2)).sum()), 1)
+        return found[:trained] if trained > 1 else found[0]
+
+    def in_condition(self, condition: Condition) -> "Measurements":
+        """Return the same measurements with every sample in one condition."""
+        places = np.zeros(self.data.sizes["sample"])
+        return self.in_conditions((condition,), places)
+
+    def in_conditions(
+        self, conditions: tuple[Condition, ...], places: np.ndarray
+    ) -> "Measurements":
+        """Return the same measurements in other conditions.
+
+        Args:
+            conditions: all of them; a union of others owns no samples of its own.
+            places: number of the condition of each sample.
+        """
+        data = self.data.assign_coords(condition=("sample", places.astype(np.int32)))
+        return Measurements(data, _with(self.header, conditions=conditions))
+
+    def with_published(self, published: tuple[PublishedValues, ...]) -> "Measurements":
+        """Return the same measurements with published values beside them."""
+        return replace(self, header=_with(self.header, published=published))
+
+    def compact(self) -> "Measurements":
+        """Return measurements of published precision: about four digits each."""
+        names = [str(k) for k, v in self.data.data_vars.items() if v.dtype.kind == "f"]
+        return replace(
+            self, data=self.data.assign({k: _rounded(self.data[k]) for k in names})
+        )
+
+    def to_bytes(self) -> bytes:
+        """Return the NetCDF-3 file: equal measurements are equal bytes."""
+        # In one order, whatever the order in which variables were added.
+        names = sorted(str(name) for name in self.data.variables)
+        parts = {n: (self.data[n].dims, self.data[n].values) for n in names}
+        header = msgspec.json.encode(self.header).decode()
+        data = xr.Dataset(parts, attrs={_HEADER: header}).set_coords([*_COORDINATES])
+        return bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
+
+    def write(self, path: Path) -> None:
+        """Write the file, compressed if the name ends in ``.xz``."""
+        data = self.to_bytes()
+        if path.suffix == ".xz":
+            data = lzma.compress(data, filters=_FILTERS)
+        write_bytes(path, data)
+
+
+def measurements_of(
+    errors: Mapping[str, np.ndarray],
+    travel_mm: np.ndarray,
+    header: Header,
+    *,
+    condition: np.ndarray,
+    row: np.ndarray,
+) -> Measurements:
+    """Return measurements of pushes.
+
+    Args:
+        errors: each ``[model, training, push, body]``.
+        travel_mm: how far each body was moved (mm), ``[push, body]``.
+        header: names the models and conditions.
+        condition: number of the condition of each push.
+        row: of each push in its dataset.
+    """
+    variables = {name: (PUSHES, values) for name, values in errors.items()}
+    places = {"condition": condition, "fold": np.full(len(row), -1), "row": row}
+    coordinates = {k: ("sample", np.asarray(v, np.int32)) for k, v in places.items()}
+    travel = {"travel_mm": (("sample", "body"), travel_mm)}
+    return Measurements(xr.Dataset(variables | travel, coordinates), header)
+
+
+def read_measurements(path: Path) -> Measurements:
+    """Read a file of measurements.
+
+    Raises:
+        BadInput: it is missing, damaged or no such file, in one line.
+    """
+    packed = read_file(path, most=_LARGEST)
+    try:
+        data = _unpack(packed) if path.suffix == ".xz" else packed
+        with xr.open_dataset(io.BytesIO(data), engine="scipy") as opened:
+            dataset = opened.load()
+        header = dataset.attrs.pop(_HEADER)
+        return Measurements(dataset, msgspec.json.decode(header, type=Header))
+    except Exception as cause:  # SciPy raises arbitrary exceptions on corrupt files
+        reason = " ".join(str(cause).split())[:200] or type(cause).__name__
+        raise BadInput(f"{path}: no measurements ({reason}); {_REMEDY}.") from None
+
+
+def _unpack(packed: bytes) -> bytes:
+    unpacker = lzma.LZMADecompressor(memlimit=_LARGEST)
+    data = unpacker.decompress(packed, max_length=_LARGEST)
+    if not unpacker.eof:
+        raise ValueError(f"cut off, or over {_LARGEST} bytes")
+    return data
+
+
+def _with(header: Header, **changes: Any) -> Header:  # noqa: ANN401
+    return msgspec.structs.replace(header, **changes)
+
+
+def _rounded(values: xr.DataArray) -> xr.DataArray:
+    """Return single-precision values whose last bits are zero: they compress well."""
+    single = np.ascontiguousarray(values.values, np.float32)
+    bits = single.view(np.uint32)
+    spare = 23 - _BITS
+    near = (bits + np.uint32(1 << (spare - 1))) & np.uint32(
+        0xFFFFFFFF >> spare << spare
+    )
+    rounded = np.where(np.isfinite(single), near, bits).view(np.float32)
+    return values.copy(data=rounded)

@@ -1,0 +1,139 @@
+"""Success of control trials, with its interval, and exact paired tests."""
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any
+
+import msgspec
+import numpy as np
+from jaxtyping import Bool
+from scipy.stats import binomtest
+
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Measurements
+
+# What an episode reaches or does not.
+MEASURES = ("solved", "within_4_mm", "within_25_pushes")
+_NEAR_MM = 4.0
+_FEW_PUSHES = 25
+
+
+class TrialRow(msgspec.Struct, frozen=True, kw_only=True):
+    """The trials of one model in one condition."""
+
+    condition: str
+    model: str  # slug
+    trials: int
+    solved: int
+    success: float
+    interval: tuple[float, float]  # Wilson, 95 %
+    median_pushes: float | None  # of solved trials
+    median_decision_s: float | None
+    within_4_mm: float
+    within_25_pushes: float
+    median_final_mm: float | None
+    ended_early: int  # the measured pose was within the tolerance, the true one not
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything but condition and model as JSON values."""
+        found = msgspec.structs.asdict(self) | {"interval": list(self.interval)}
+        return {k: v for k, v in found.items() if k not in ("condition", "model")}
+
+
+class TrialTest(msgspec.Struct, frozen=True, kw_only=True):
+    """An exact McNemar test of two models on the same goals."""
+
+    condition: str
+    measure: str  # one of `MEASURES`
+    model: str
+    against: str
+    only_one: int  # trials in which `model` reached it and `against` did not
+    only_other: int
+    p: float
+
+
+def trial_rows(measured: Measurements) -> tuple[TrialRow, ...]:
+    """Return success with its interval, medians and shares, condition by condition."""
+    return tuple(
+        _row(measured, slug, condition)
+        for condition in measured.header.conditions
+        for slug in measured.slugs
+        if _was_tried(measured, slug, condition)
+    )
+
+
+def compare_trials(measured: Measurements) -> tuple[TrialTest, ...]:
+    """Return the tests of every pair of models, for each measure."""
+    return tuple(
+        test
+        for condition in measured.header.conditions
+        for test in _tests(measured, condition)
+    )
+
+
+def _was_tried(measured: Measurements, slug: str, condition: Condition) -> bool:
+    part = measured.samples_of(condition)
+    return bool(np.isfinite(measured.values("solved", slug)[part]).any())
+
+
+def _row(measured: Measurements, slug: str, condition: Condition) -> TrialRow:
+    part = measured.samples_of(condition)
+
+    def column(name: str) -> np.ndarray:
+        return measured.values(name, slug)[part]
+
+    solved, near, soon = (
+        reached(measured, slug, condition, measure) for measure in MEASURES
+    )
+    seconds = column("decision_s")
+    seconds = seconds[np.isfinite(seconds)]
+    median = float(np.median(column("final_mm")))
+    interval = binomtest(int(solved.sum()), len(solved)).proportion_ci(method="wilson")
+    pushes = column("pushes")[solved]
+    return TrialRow(
+        condition=condition.label,
+        model=slug,
+        trials=len(solved),
+        solved=int(solved.sum()),
+        success=float(solved.mean()),
+        interval=(float(interval.low), float(interval.high)),
+        median_pushes=float(np.median(pushes)) if solved.any() else None,
+        median_decision_s=float(np.median(seconds)) if len(seconds) else None,
+        within_4_mm=float(near.mean()),
+        within_25_pushes=float(soon.mean()),
+        median_final_mm=median if np.isfinite(median) else None,
+        ended_early=int(((column("ended") > 0) & ~solved).sum()),
+    )
+
+
+def reached(
+    measured: Measurements, slug: str, condition: Condition, measure: str
+) -> Bool[np.ndarray, " trial"]:
+    """Return which trials reached one of `MEASURES`."""
+    part = measured.samples_of(condition)
+    solved = measured.values("solved", slug)[part] > 0
+    if measure == "within_4_mm":
+        return measured.values("final_mm", slug)[part] <= _NEAR_MM
+    if measure == "within_25_pushes":
+        return solved & (measured.values("pushes", slug)[part] <= _FEW_PUSHES)
+    return solved
+
+
+def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
+    tried = [s for s in measured.slugs if _was_tried(measured, s, condition)]
+    for measure in MEASURES:
+        found = {s: reached(measured, s, condition, measure) for s in tried}
+        for against, model in combinations(tried, 2):
+            mine, theirs = found[model], found[against]
+            only_one, only_other = (mine & ~theirs).sum(), (theirs & ~mine).sum()
+            unlike = int(only_one + only_other)
+            p = binomtest(int(only_one), unlike).pvalue if unlike else 1.0
+            yield TrialTest(
+                condition=condition.label,
+                measure=measure,
+                model=model,
+                against=against,
+                only_one=int(only_one),
+                only_other=int(only_other),
+                p=float(p),
+            )

@@ -1,0 +1,55 @@
+"""Verdicts in words: which model is better than which, and by how much."""
+
+from collections.abc import Sequence
+
+from sainet.evaluation.claims import Claim, Places, best_network, solved
+from sainet.evaluation.metrics import METRICS
+from sainet.evaluation.summary import Comparison, Summary
+from sainet.report.pages.templates import render_text
+from sainet.report.palette import labels_of
+
+
+def verdicts_on(summary: Summary) -> tuple[str, ...]:
+    """Return a sentence for each condition: the best network beside the engine."""
+    labels = labels_of(summary.models)
+    conditions = [condition.label for condition in summary.conditions]
+    if summary.is_of_trials:
+        found = [solved(summary, condition) for condition in conditions]
+        return (_worded("solved", labels=labels, conditions=found),)
+    best = [best_network(summary, condition) for condition in conditions]
+    return tuple(_worded("best", labels=labels, verdict=b) for b in best if b)
+
+
+def rulings(claims: Sequence[Claim], summary: Summary) -> tuple[str, ...]:
+    """Return each claim with its verdict."""
+    return tuple(
+        _worded("claim", claim=claim, status=claim.rule(summary).status)
+        for claim in claims
+    )
+
+
+def worded_places(found: Places, summary: Summary) -> str:
+    """Return in which errors a model is better or worse than another."""
+    labels = labels_of(summary.models)
+    return _worded(
+        "places",
+        labels=labels,
+        places=found,
+        better=_where(found.better),
+        worse=_where(found.worse),
+    )
+
+
+def _where(found: Sequence[Comparison]) -> str:
+    """Return errors and disks: "pos of disks 1 and 2, rot of disk 1"."""
+    bodies: dict[str, list[str]] = {}
+    for each in found:
+        bodies.setdefault(METRICS[each.metric].name, []).append(str(each.body))
+    return ", ".join(
+        f"{name} of disk{'s' * (len(disks) > 1)} {' and '.join(disks)}"
+        for name, disks in bodies.items()
+    )
+
+
+def _worded(kind: str, **values: object) -> str:
+    return render_text("verdicts.j2", kind=kind, **values)

@@ -1,0 +1,64 @@
+"""Pages of results: rendering them again changes nothing, and no number is typed."""
+
+import re
+import shutil
+
+import pytest
+
+from sainet.report.pages.results import (
+    BEGIN,
+    END,
+    TEMPLATES,
+    numbers_in,
+    rendered,
+    with_block,
+)
+from support import REPOSITORY
+
+
+@pytest.mark.slow
+def test_rendering_again_changes_nothing():
+    pages = rendered(REPOSITORY)
+    assert {path for path in pages if path.read_text("utf-8") != pages[path]} == set()
+    known = {path for path in pages if path.parent.name == "results"}
+    assert known == set((REPOSITORY / "docs" / "results").glob("*.md"))
+
+
+def test_no_number_in_a_template_is_typed():
+    for path in (REPOSITORY / TEMPLATES).glob("*.j2"):
+        prose = re.sub(r"{[{%].*?[%}]}", "", path.read_text("utf-8"), flags=re.DOTALL)
+        assert numbers_in(prose) == [], path.name
+    assert numbers_in((REPOSITORY / "README.md").read_text("utf-8")) == []
+
+
+def test_evidence_stays_small():
+    files = [path for path in (REPOSITORY / "results").glob("*") if path.is_file()]
+    assert 0 < sum(path.stat().st_size for path in files) < 5 << 20
+
+
+def test_a_typed_number_is_found_and_a_rendered_one_is_not():
+    assert numbers_in("SAIN errs by 0.6 mm") == ["SAIN errs by 0.6 mm"]
+    for text in ("`--pushes 4500`", f"{BEGIN}0.6 mm{END}", "disk 2", "Python 3.11"):
+        assert numbers_in(text) == []
+
+
+def test_a_text_without_a_place_for_its_block_is_refused():
+    assert with_block(f"a\n{BEGIN}old\n{END}\nb", "new\n") == f"a\n{BEGIN}new\n{END}\nb"
+    with pytest.raises(ValueError, match="no <!-- rendered"):
+        with_block("# sainet", "new")
+
+
+def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
+    for name in ("results", TEMPLATES):
+        (tmp_path / name).mkdir(parents=True)
+    for name in ("index", "readme-block", "benchmarks"):
+        text = (
+            "# Timings\n\n{{ plain('benchmarks') }}" if name == "benchmarks" else name
+        )
+        (tmp_path / TEMPLATES / f"{name}.md.j2").write_text(text)
+    shutil.copy(REPOSITORY / "results" / "benchmarks.tables.json", tmp_path / "results")
+    (tmp_path / "README.md").write_text(f"{BEGIN}{END}")
+    pages = {path.name: text for path, text in rendered(tmp_path).items()}
+    assert pages["README.md"] == f"{BEGIN}readme-block\n{END}"
+    assert "| `devices` |" in pages["benchmarks.md"]
+    assert pages["index.md"] == "index\n"
