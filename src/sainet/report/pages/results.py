@@ -104,7 +104,7 @@ class Evidence:
 
     def _figure(self, name: str, table: int, figure: str) -> float:
         rows = self.figures(name).tables[table].rows
-        return float(dict(rows)[f"`{figure}`"])
+        return float({row[0]: row[1] for row in rows}[f"`{figure}`"])
 
 
 def slashed(values: Sequence[float]) -> str:
@@ -239,6 +239,8 @@ _EXEMPT = (
     r"\b(ICRA|Ajay et al\.,?) \(?\d{4}\)?",
     r"\bl2\b",
     r"\b([Dd]isks?|[Ff]igure|section|Apache-)\s?\d+(\.\d+)?[a-z]?",
+    r"arXiv:[\d.]+",
+    r"examples/\w+",
     r"<img[^>]*>",
 )
 
