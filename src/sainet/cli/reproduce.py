@@ -70,7 +70,7 @@ class Reproduce:
         return only if len(tables) == 1 else {"experiments": tables}
 
     def _trainer_pool(self) -> AbstractContextManager[Executor | None]:
-        """Return the processes that train at once; none where one is trained alone.
+        """Return the processes that train in parallel; None for one at a time.
 
         Raises:
             BadInput: fewer than one is wanted, or several on one GPU.

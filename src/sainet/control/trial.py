@@ -29,7 +29,7 @@ class Trial(NamedTuple):
 
     robot: SimulatedRobot
     task: PushToGoal
-    scene: Scene  # as model and task believe it
+    scene: Scene  # properties given to model and task
 
 
 def make_trial(config: ControlConfig, index: int) -> Trial:

@@ -21,7 +21,7 @@ def to_single_steps(batch: PushBatch, engine: AbstractEngine | None) -> PushBatc
 
     Args:
         batch: pushes whose pusher follows a path, the truth known at every step.
-        engine: predicts s-bar of each step; None for a network alone.
+        engine: predicts s-bar of each step; None for a network without an engine.
     """
     steps = batch.truth.shape[1]
     scene = jax.tree.map(lambda x: jnp.repeat(x, steps, axis=0), batch.scene)

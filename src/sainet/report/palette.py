@@ -84,7 +84,7 @@ def styles_of(names: Iterable[str]) -> dict[str, ModelStyle]:
 
 
 def style_of(name: str) -> ModelStyle:
-    """Return the style of one model that is drawn alone."""
+    """Return the style of a single model."""
     return styles_of([name])[name]
 
 

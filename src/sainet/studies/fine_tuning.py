@@ -90,7 +90,7 @@ class _Tuner:
     chain: Chain
 
     def with_few(self) -> "_Tuner":
-        """Return what tunes on the first of the recordings alone."""
+        """Return a tuner with only the first recordings."""
         return replace(self, training=self.training.first(_FEW[self.scale]))
 
     def tune(self, start: str, change: Change) -> Measurements:

@@ -1,4 +1,4 @@
-"""The report of a run folder: what it holds, whichever command made it."""
+"""The report of a run folder, for the outputs of any command."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,14 +1,14 @@
-"""Simulated strokes of one disk, like the recorded ones, and networks that know them.
+"""Simulated long pushes of one disk, like the recorded pushes, and their networks.
 
-The paper's pushes last 0.2 s, recorded strokes up to 5 s; a network that has seen the
-first alone is lost long before the others end. These networks go on from the paper's.
+The paper's pushes last 0.2 s, recorded pushes up to 5 s, and a network trained only on
+the former diverges long before the end of the latter. These networks are the paper's
+networks, fine-tuned on simulated long pushes.
 
-The disk is the recorded one, which is also what the engine believes it to be: strokes
-of disks that are not would teach a network to mistrust an engine that is right. Its
-pressure is even, as of a flat disk, where Bullet's disks rest on their rims. And the
-pusher does not tremble: the tracking error of the simulated robot (0.2 mm, 0.1 s) has a
-velocity of some 14 mm/s, which a push at 50 mm/s hardly feels, and which at 10 mm/s
-shakes friction away and halves the rotation of the disk.
+The disk has the properties of the recorded disk, which are also the assumed properties:
+other disks would teach a network to correct an engine that is right. The pressure is
+uniform. The pusher has no tracking error: that of the simulated robot (0.2 mm, 0.1 s)
+has a velocity of about 14 mm/s, which hardly affects a push at 50 mm/s, but at 10 mm/s
+breaks the friction and halves the rotation of the disk.
 """
 
 from dataclasses import dataclass, replace
