@@ -208,7 +208,7 @@ def put(name, value):
         (put("radius_mm", [-54.0, 59.0]), r"radius_mm\[0\]: expected"),
         (put("model", "\ud800"), "JSON is malformed|surrogate|Invalid"),
         (put("moved", 2), "moved is 2 of 2 disks"),
-        (put("trial", 1), "trial is 1, another episode"),
+        (put("trial", 1), "trial is 1, which is another episode"),
     ],
 )
 def test_errors_in_an_episode_file_are_named(tmp_path, done, damage, says):

@@ -14,7 +14,7 @@ from sainet.cli.reproduce import Reproduce
 from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
 from sainet.studies import EXPERIMENTS, load_experiment
-from sainet.studies.published import ROBOT_TWO_DISKS, published_rows
+from sainet.studies.published import ROBOT_TWO_DISKS
 from sainet.studies.result import Result
 from support import SOURCE
 
@@ -119,7 +119,7 @@ def test_the_help_names_every_study():
     assert all(name in source for name in EXPERIMENTS)
 
 
-def test_published_rows_are_the_papers():
-    rows = published_rows(ROBOT_TWO_DISKS)
-    sain = next(r for r in rows if r["model"] == "sain" and r["body"] == 2)
-    assert (sain["pos_mm"], sain["rot_deg"], sain["trans_percent"]) == (3.47, 0.21, 1.5)
+def test_published_values_are_the_papers():
+    (sain,) = (each for each in ROBOT_TWO_DISKS if each.model.slug == "sain")
+    second = {metric: values[1] for metric, values in sain.values.items()}
+    assert second == {"trans_percent": 1.50, "pos_mm": 3.47, "rot_deg": 0.21}
