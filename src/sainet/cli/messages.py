@@ -26,7 +26,7 @@ def message(error: SainetError, command: type | None = None) -> str:
         error: of the library.
         command: the dataclass of the command that was called, if it is known.
     """
-    options = set(_options(command)) if command else set()
+    options = _options(command) if command else set()
 
     def option(found: re.Match[str]) -> str:
         name = found[1]
@@ -44,15 +44,22 @@ def _short(line: str) -> str:
     return f"{line[:half]} ... {line[-half:]}"
 
 
-def _options(settings: Any) -> Iterator[str]:  # noqa: ANN401
-    """Yield the names of all options of a dataclass of settings, nested ones too."""
+def _options(command: type) -> set[str]:
+    """Return the names of all options of a command, without its positional ones."""
+    names = dict(_fields(command))
+    return {name for name, is_option in names.items() if is_option}
+
+
+def _fields(settings: Any) -> Iterator[tuple[str, bool]]:  # noqa: ANN401
+    """Yield each name and whether it is an option; outer fields come last and win."""
     hints = get_type_hints(settings, include_extras=True)
+    own = []
     for field in fields(settings):
         hint = hints[field.name]
-        extras = getattr(hint, "__metadata__", ())
-        kind = get_args(hint)[0] if extras else hint
-        parts = [part for part in (kind, *get_args(kind)) if is_dataclass(part)]
-        for part in parts:
-            yield from _options(part)
-        if not parts and _POSITIONAL not in extras:
-            yield field.name
+        if is_dataclass(hint):
+            yield from _fields(hint)
+        else:
+            own.append(
+                (field.name, _POSITIONAL not in getattr(hint, "__metadata__", ()))
+            )
+    yield from own
