@@ -23,11 +23,15 @@ def test_its_size_is_the_error_of_the_evaluation(tmp_path):
     arrays = end_points_alone(made_up(info, lengths=[12, 8, 12] * 3))
     store = write(tmp_path / "data", info, arrays)
     model = load_model("physics")
-    found, known = end_offsets(model, store), evaluate([model], store).errors["physics"]
+    found, known = end_offsets(model, store), evaluate([model], store)
     size = 1000 * np.hypot(found.along, found.across)
-    np.testing.assert_allclose(size, known.final_pos_mm[:, 0], rtol=1e-4)
+    np.testing.assert_allclose(
+        size, known.values("final_pos_mm", "physics").reshape(-1), rtol=1e-4
+    )
     turn = np.abs(np.rad2deg(found.turn))
-    np.testing.assert_allclose(turn, known.final_rot_deg[:, 0], rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(
+        turn, known.values("final_rot_deg", "physics").reshape(-1), rtol=1e-4, atol=1e-4
+    )
     np.testing.assert_allclose(found.place, arrays["initial"][:, 0, :2], rtol=1e-6)
     way = arrays["command_position"][0, 11] - arrays["initial_pusher"][0]
     assert found.heading[0] == pytest.approx(np.arctan2(way[1], way[0]), abs=1e-3)

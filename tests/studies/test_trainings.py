@@ -117,5 +117,5 @@ def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):
 @pytest.mark.parametrize("processes", [Broken(), Gone()])
 def test_a_killed_training_process_is_reported(store, tmp_path, processes):
     trainings = both(store, tmp_path)["in"].of_seeds(SEEDS)
-    with pytest.raises(SainetError, match="want of memory"):
+    with pytest.raises(SainetError, match="memory ran out"):
         train_at_once(trainings, processes, lambda done, note: None)
