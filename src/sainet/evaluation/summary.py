@@ -274,7 +274,7 @@ def _folds(folds: np.ndarray) -> Folds | None:
 
 
 def _estimate(found: Interval, body: int, *, with_interval: bool = True) -> Estimate:
-    value, low, high = (_number(part[body]) for part in found)
+    value, low, high = (_number(float(part[body])) for part in found)
     return Estimate(value, low, high) if with_interval else Estimate(value)
 
 
