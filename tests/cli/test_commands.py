@@ -83,7 +83,10 @@ def test_missing_inputs_are_named(tmp_path, monkeypatch, words, names):
 
 @pytest.mark.parametrize(
     "words",
-    [("report", "{}"), ("import", "table", "{}", "--properties", "{}", "--out", "x")],
+    [
+        ("report", "{}"),
+        ("import", "table", "{}.csv", "--properties", "{}", "--out", "x"),
+    ],
 )
 def test_an_impossible_path_gives_one_line(words):
     path = "x" * 300
@@ -163,7 +166,7 @@ def test_shipped_networks_are_compared_where_they_fit(pushes):
         assert f"Left out: {name}." in done.stderr
     words = ("evaluate", "--model", "sain", "--engine", "bullet", "--data", pushes)
     error = sainet(*words, status=2).stderr
-    assert "inner_engine is 'planar', not 'bullet'" in error
+    assert "internal engine is 'planar', not 'bullet'" in error
     assert len(error.splitlines()) == 1
 
 

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from sainet.cli.output import Output
+from sainet.runs.interrupts import raise_if_interrupted
 
 Advance = Callable[[int, str], None]  # number of finished units, and a note
 COMPILING = "compiling"
@@ -63,6 +64,7 @@ def progress_bar(
         task = bar.add_task(title, total=None, note=waiting, rate="")
 
         def advance(amount: int, note: str = "") -> None:
+            raise_if_interrupted()
             rate = pace.add(amount)
             begun = pace.begun is not None
             bar.update(
