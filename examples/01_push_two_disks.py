@@ -6,8 +6,7 @@ import jax.numpy as jnp
 from sainet import PlanarEngine, PushGrid, Scene
 from sainet.engines.assumed import AssumedProperties
 from sainet.models.dynamics import PhysicsDynamics, predict
-from sainet.scenes.controls import path_controls
-from sainet.scenes.pushes import place_pusher, push_direction
+from sainet.scenes.pushes import command_path
 from sainet.scenes.state import at_rest
 
 # One scene: two steel disks on ABS, the second in front of the first.
@@ -28,17 +27,9 @@ scenes, positions = jax.tree.map(
     lambda x: jnp.broadcast_to(x, (count, *x.shape)), (scene, position)
 )
 resting = at_rest(positions, jnp.zeros((count, 2)), positions[:, 0])
-start = place_pusher(scenes, resting, pushes)
-initial = at_rest(positions, resting.angle, start)
-controls = path_controls(
-    pushes,
-    start,
-    push_direction(resting, pushes),
-    steps=80,
-    time_step=scene.time_step,
-)
+initial, controls = command_path(scenes, resting, pushes, steps=80)
 
-# An engine that knows the scene, and the paper's, which assumes fixed properties.
+# An engine with the true properties, and the paper's, which assumes fixed properties.
 for name, engine in (
     ("true properties", PlanarEngine()),
     ("assumed properties", AssumedProperties(PlanarEngine())),

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
 
@@ -39,19 +39,11 @@ class Placement(NamedTuple):
         )
 
     def controls(self, controls: Controls) -> Controls:
-        if isinstance(controls, PathControls):
-            return PathControls(
-                position=single(self.point(controls.position)),
-                velocity=single(self.vector(controls.velocity)),
-            )
-        return eqx.tree_at(
-            lambda c: (c.force, c.contact_offset),
-            controls,
-            (
-                single(self.vector(controls.force)),
-                single(self.vector(controls.contact_offset)),
-            ),
-        )
+        placed = jax.tree.map(lambda vector: single(self.vector(vector)), controls)
+        if controls.pusher_path is None:
+            return placed
+        path = single(self.point(controls.pusher_path))
+        return eqx.tree_at(lambda c: c.position, placed, path)
 
 
 def single(values) -> jax.Array:

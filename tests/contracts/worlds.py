@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.util import find_spec
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,9 +12,9 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.sampling import Draws, draw
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
-from sainet.scenes.controls import Controls, PathControls, force_controls, path_controls
-from sainet.scenes.pushes import Push, place_pusher, push_direction
-from sainet.scenes.scene import TIME_STEP, Scene
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.pushes import Push, command_force, command_path
+from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
 from support import require
 
@@ -169,14 +168,9 @@ def push_of(
             )
         )
     )
-    start = place_pusher(scene, resting, push)
-    heading = push_direction(resting, push)
-    initial = at_rest(position, resting.angle, start)
     if config.setup == "robot":
-        controls = path_controls(push, start, heading, steps=steps, time_step=TIME_STEP)
-    else:
-        controls = force_controls(initial, heading, force=8.0, steps=steps)
-    return initial, controls
+        return command_path(scene, resting, push, steps=steps)
+    return command_force(scene, resting, push, force=8.0, steps=steps)
 
 
 def first_steps(controls: Controls, steps: int) -> Controls:
@@ -190,9 +184,8 @@ def later_steps(controls: Controls, start: int) -> Controls:
 
 
 def _cut(controls: Controls, part: slice) -> Controls:
-    if isinstance(controls, PathControls):
-        return PathControls(controls.position[:, part], controls.velocity[:, part])
-    return eqx.tree_at(lambda c: c.force, controls, controls.force[:, part])
+    has_time = controls.command.ndim
+    return jax.tree.map(lambda x: x[:, part] if x.ndim == has_time else x, controls)
 
 
 def together(*trees):

@@ -18,7 +18,6 @@ from sainet.engines.base import roll_out
 from sainet.engines.planar import engine as planar
 from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.scenes.controls import PathControls
 from sainet.scenes.scene import FrictionField
 from sainet.scenes.shapes import pair_gaps, pusher_gaps
 
@@ -53,11 +52,10 @@ def naive_world(scene, start, pusher_mass: float) -> World:
 
 def naive_path(scene, start, controls) -> tuple[np.ndarray, np.ndarray]:
     """Positions and angles after each step, by the reference."""
-    by_path = isinstance(controls, PathControls)
-    world = naive_world(scene, start, np.inf if by_path else controls.pusher_mass)
-    commands = controls.position if by_path else controls.force
+    by_path = controls.pusher_path is not None
+    world = naive_world(scene, start, controls.pusher.mass)
     places, angles = [], []
-    for command in np.asarray(commands[0], float):
+    for command in np.asarray(controls.command[0], float):
         (world.follow if by_path else world.push)(command)
         places.append([disk.position for disk in world.disks])
         angles.append([disk.angle for disk in world.disks])

@@ -32,7 +32,6 @@ from sainet.identification.residuals import Scale, residuals, samples, slopes
 from sainet.models.identified import FILE, read_identified
 from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.errors import BadInput, BadStore, RunConflict
-from sainet.scenes.controls import move_controls, move_pusher
 
 OFFSET = {"camera_x_mm": 0.8, "camera_y_mm": -0.5}
 TRUE = {"pusher_friction": 0.17, "pressure_radius_ratio": 0.5, **OFFSET}
@@ -61,8 +60,8 @@ def store(tmp_path_factory):
         to_scene(arrays, info), {k: jnp.float32(v) for k, v in TRUE.items()}
     )
     offset = jnp.array([TRUE[name] for name in OFFSET]) / 1000
-    initial = move_pusher(to_initial(arrays), offset)
-    controls = move_controls(to_controls(arrays, info), offset)
+    initial = to_initial(arrays).with_pusher_moved(offset)
+    controls = to_controls(arrays, info).moved(offset)
     motion, _ = from_trajectory(
         eqx.filter_jit(engine.rollout)(scene, initial, controls)
     )

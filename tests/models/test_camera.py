@@ -41,7 +41,7 @@ def test_predictions_equal_those_in_robot_coordinates(name, setup):
     told = eqx.tree_at(
         lambda s: s.position, initial, initial.position + offset[None, None]
     )
-    if not isinstance(controls, PathControls):  # from the disk that is seen
+    if controls.pusher_path is None:  # measured from the displaced disk
         contact = controls.contact_offset - offset[None]
         controls = eqx.tree_at(lambda c: c.contact_offset, controls, contact)
     found = predict(OffsetCamera(model, OFFSET), scene, told, controls)

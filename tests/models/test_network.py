@@ -27,7 +27,6 @@ from sainet.models.dynamics import (
 )
 from sainet.models.features import feature_set
 from sainet.models.frame import (
-    controls_to_frame,
     motion_from_frame,
     motion_to_frame,
     push_frame,
@@ -35,8 +34,7 @@ from sainet.models.frame import (
 from sainet.models.inputs import in_columns, near_pairs, still_features
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.widen import widen
-from sainet.scenes.controls import path_controls
-from sainet.scenes.pushes import Push
+from sainet.scenes.pushes import Push, command_path
 from sainet.scenes.scene import TIME_STEP
 from sainet.scenes.shapes import pair_gaps
 from sainet.scenes.state import at_rest, pack_motion
@@ -235,7 +233,7 @@ def test_the_push_frame_has_its_x_axis_along_the_normal(kind):
         np.testing.assert_allclose(local[push], one.start, atol=1e-6)
         np.testing.assert_allclose(local[push, one.pushed, :2], 0, atol=1e-7)
     np.testing.assert_allclose(motion_from_frame(local, frame), motion, atol=1e-6)
-    commands = controls_to_frame(controls, frame)
+    commands = controls.in_frame(frame.origin, frame.angle)
     if kind == "robot":
         gap = scene.radius[:, 0] + scene.pusher_radius
         # The command at the end of the first step is at most one step further on.
@@ -248,13 +246,10 @@ def overlapping_push():
     """Disks that overlap by 3 mm, the pusher 3 mm inside the first, for 200 steps."""
     scene = make_scene([[0.9, 1.1]] * 2, [[0.055, 0.052]] * 2)
     place = jnp.array([[[0.0, 0.0], [0.104, 0.0]], [[0.2, 0.1], [0.2, 0.204]]])
-    pusher = place[:, 0] - jnp.array([[0.0568, 0.0], [0.0, 0.0568]])
-    state = at_rest(place, jnp.zeros((2, 2)), pusher)
+    state = at_rest(place, jnp.zeros((2, 2)), place[:, 0])
     one = jnp.ones(2)
     push = Push(0 * one, 0 * one, 0.01 * one, 0.05 * one)
-    heading = jnp.array([[1.0, 0.0], [0.0, 1.0]])
-    controls = path_controls(push, pusher, heading, steps=200, time_step=TIME_STEP)
-    return scene, state, controls
+    return scene, *command_path(scene, state, push, steps=200, gap=-0.003)
 
 
 def test_gradients_are_finite_over_a_whole_push_that_starts_in_overlap():

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 
 from contracts.worlds import make_scene
-from sainet.scenes.controls import force_controls, path_controls
-from sainet.scenes.pushes import Push, PushGrid, place_pusher, push_axis, push_direction
+from sainet.scenes.pushes import (
+    Push,
+    PushGrid,
+    command_force,
+    command_path,
+    place_pusher,
+    push_axis,
+    push_direction,
+)
 from sainet.scenes.scene import TIME_STEP
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import at_rest
@@ -71,12 +78,17 @@ def test_angles_rotate_the_start_and_the_heading():
     np.testing.assert_allclose(heading[0], wanted, atol=1e-6)
 
 
-def test_a_path_has_its_length_and_speed_and_then_holds():
-    start, heading = jnp.array([[0.1, 0.2]]), jnp.array([[0.6, 0.8]])
-    controls = path_controls(push(), start, heading, steps=60, time_step=TIME_STEP)
+def test_a_path_goes_its_length_at_its_speed_and_holds():
+    scene, state = scene_and_state([[0.1, 0.2]])
+    along = push(direction=np.arctan2(0.8, 0.6))
+    initial, controls = command_path(scene, state, along, steps=60)
     assert controls.steps == 60
     assert controls.kind == "robot"
-    gone = np.linalg.norm(controls.position[0] - start, axis=-1)
+    start = initial.pusher_position
+    np.testing.assert_allclose(start, place_pusher(scene, state, along))
+    way = np.asarray(controls.position[0] - start)
+    np.testing.assert_allclose(way, way[:, :1] * np.array([1, 4 / 3]), atol=1e-7)
+    gone = np.linalg.norm(way, axis=-1)
     np.testing.assert_allclose(gone[:48], 0.05 / 240 * np.arange(1, 49), atol=1e-7)
     np.testing.assert_allclose(gone[48:], 0.01, atol=1e-7)
     speed = np.linalg.norm(controls.velocity[0], axis=-1)
@@ -89,27 +101,26 @@ def test_a_path_has_its_length_and_speed_and_then_holds():
 )
 def test_a_path_is_the_sum_of_its_velocities(length, speed):
     steps = int(length / speed * 240) + 5
-    controls = path_controls(
-        push(length=length, speed=speed),
-        jnp.zeros((1, 2)),
-        jnp.array([[1.0, 0.0]]),
-        steps=steps,
-        time_step=TIME_STEP,
+    scene, state = scene_and_state([[0.0548, 0.0]])
+    initial, controls = command_path(
+        scene, state, push(length=length, speed=speed), steps=steps
     )
     path = np.cumsum(np.asarray(controls.velocity, np.float64), axis=1) * TIME_STEP
+    path += np.asarray(initial.pusher_position)[:, None]
     np.testing.assert_allclose(controls.position, path, atol=1e-6)
     assert float(controls.position[0, -1, 0]) == pytest.approx(length, abs=1e-7)
     assert np.asarray(controls.velocity).max() <= speed * 1.001
 
 
 def test_forces_are_constant_along_the_heading():
-    _, state = scene_and_state([[0.1, 0.0]])
-    heading = jnp.array([[0.6, 0.8]])
-    controls = force_controls(state, heading, force=8.0, steps=5)
+    scene, state = scene_and_state([[0.1, 0.0]])
+    along = push(direction=np.arctan2(0.8, 0.6))
+    initial, controls = command_force(scene, state, along, force=8.0, steps=5)
     assert controls.steps == 5
     assert controls.kind == "direct-force"
     np.testing.assert_allclose(controls.force, [[[4.8, 6.4]] * 5], rtol=1e-6)
-    np.testing.assert_allclose(controls.contact_offset, [[-0.1, 0.0]], rtol=1e-6)
+    np.testing.assert_allclose(controls.contact_offset, [[-0.0548, 0.0]], atol=1e-7)
+    np.testing.assert_allclose(initial.pusher_position, [[0.0452, 0.0]], atol=1e-7)
 
 
 def test_a_batch_equals_a_map_over_scenes():

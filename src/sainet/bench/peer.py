@@ -15,7 +15,7 @@ from sainet.bench.problem import Problem
 from sainet.learning.batch import path_to_frame, to_target
 from sainet.models.bounded import GRADIENT_BOUND, GRADIENT_SIZES
 from sainet.models.correctors.interaction import FEATURE_BOUND
-from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
+from sainet.models.frame import motion_to_frame, push_frame
 from sainet.models.inputs import drives, still_features
 from sainet.runs.errors import SainetError
 from sainet.scenes.state import pack_motion
@@ -109,7 +109,9 @@ def _batch_arrays(problem: Problem) -> dict[str, Any]:
     frame = push_frame(whole.scene, whole.initial)
     initial = motion_to_frame(pack_motion(whole.initial), frame)
     simulated = path_to_frame(whole.simulated, frame).swapaxes(0, 1)
-    drive = drives(controls_to_frame(whole.controls, frame), initial, simulated)
+    drive = drives(
+        whole.controls.in_frame(frame.origin, frame.angle), initial, simulated
+    )
     target = to_target(whole)
     arrays = {
         "initial": initial,

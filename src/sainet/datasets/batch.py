@@ -10,7 +10,7 @@ from jaxtyping import Array, Bool, Float
 
 from sainet.datasets.schema import StoreInfo, simulated_name
 from sainet.runs.errors import Diverged
-from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.controls import CONTROLS, Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
@@ -89,16 +89,8 @@ def to_controls(
     arrays: dict[str, np.ndarray], info: StoreInfo, time: slice = slice(None)
 ) -> Controls:
     """Return the controls of stored pushes."""
-    if info.kind == "robot":
-        return PathControls(
-            position=jnp.asarray(arrays["command_position"][:, time]),
-            velocity=jnp.asarray(arrays["command_velocity"][:, time]),
-        )
-    return ForceControls(
-        force=jnp.asarray(arrays["force"][:, time]),
-        contact_offset=jnp.asarray(arrays["contact_offset"]),
-        pusher_mass=info.pusher_mass,
-        damping=info.damping,
+    return CONTROLS[info.kind].from_arrays(
+        arrays, time, pusher_mass=info.pusher_mass, damping=info.damping
     )
 
 

@@ -18,7 +18,6 @@ from sainet.datasets.batch import (
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import InternalEngine, SimulatorSpec
-from sainet.scenes.controls import move_controls, move_pusher
 
 
 def simulate(
@@ -64,8 +63,8 @@ def as_measured(internal: InternalEngine, batch: PushBatch) -> PushBatch:
     offset = jnp.array(internal.camera.vector)
     return replace(
         batch,
-        initial=move_pusher(batch.initial, offset),
-        controls=move_controls(batch.controls, offset),
+        initial=batch.initial.with_pusher_moved(offset),
+        controls=batch.controls.moved(offset),
     )
 
 
@@ -75,8 +74,8 @@ def _predict(
     initial, controls = to_initial(arrays), to_controls(arrays, info)
     if internal.camera:
         offset = jnp.array(internal.camera.vector)
-        initial = move_pusher(initial, offset)
-        controls = move_controls(controls, offset)
+        initial = initial.with_pusher_moved(offset)
+        controls = controls.moved(offset)
     scene = to_scene(arrays, info)
     trajectory = roll_out(internal.simulator.build(), scene, initial, controls)
     return from_trajectory(trajectory)[0]

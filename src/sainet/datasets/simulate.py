@@ -15,10 +15,8 @@ from sainet.scenes.controls import (
     Controls,
     ForceControls,
     PathControls,
-    force_controls,
-    path_controls,
 )
-from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.pushes import Push, command_force, command_path
 from sainet.scenes.scene import TIME_STEP, FrictionField, Scene
 from sainet.scenes.state import State, at_rest, pack_motion
 from sainet.worlds.noise import (
@@ -122,16 +120,14 @@ def _commands(
         length=jnp.asarray(draws.stroke, jnp.float32),
         speed=jnp.asarray(draws.speed, jnp.float32),
     )
-    start = place_pusher(scene, resting, push, gap=config.gap_mm / 1000)
-    heading = push_direction(resting, push)
-    initial = at_rest(position, resting.angle, start)
+    gap = config.gap_mm / 1000
     if config.setup == "robot":
-        controls = path_controls(
-            push, start, heading, steps=info.steps, time_step=info.time_step
+        initial, controls = command_path(
+            scene, resting, push, steps=info.steps, gap=gap
         )
     else:
-        controls = force_controls(
-            initial, heading, force=config.force_n, steps=info.steps
+        initial, controls = command_force(
+            scene, resting, push, force=config.force_n, steps=info.steps, gap=gap
         )
     return scene, initial, controls, _steps(config, draws.stroke, draws.speed)
 
@@ -173,6 +169,7 @@ def _disturb(
         return eqx.tree_at(
             lambda c: c.force, controls, jnp.asarray(force + error, jnp.float32)
         )
+    assert isinstance(controls, PathControls)
     moving = np.abs(np.asarray(controls.velocity)).max(axis=-1) > 0
     error = tracking_error(rng, moving, noise, time_step)
     return PathControls(
@@ -193,10 +190,5 @@ def _scene_arrays(
     names = ("mass", "radius", "table_friction", "disk_friction", "pusher_friction")
     arrays = {name: getattr(scene, name) for name in (*names, "pusher_radius")}
     arrays |= {"initial": pack_motion(initial)}
-    arrays |= {"initial_pusher": initial.pusher_position}
-    if isinstance(controls, PathControls):
-        arrays |= {"command_position": controls.position}
-        arrays |= {"command_velocity": controls.velocity}
-    else:
-        arrays |= {"force": controls.force, "contact_offset": controls.contact_offset}
+    arrays |= {"initial_pusher": initial.pusher_position, **controls.arrays()}
     return {name: np.asarray(value) for name, value in arrays.items()}

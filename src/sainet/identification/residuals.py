@@ -12,7 +12,6 @@ from jaxtyping import Array, Float, Int
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.identification.parameters import camera_at, values_at, with_values
-from sainet.scenes.controls import move_controls, move_pusher
 
 _LOOKS = 8  # observed poses of a push that are compared, evenly spaced
 _BATCH = 256  # pushes at a time
@@ -71,8 +70,8 @@ def pose_errors(
     scene, engine = with_values(batch.scene, values)
     offset = camera_at(values)
     start, controls = (
-        move_pusher(batch.initial, offset),
-        move_controls(batch.controls, offset),
+        batch.initial.with_pusher_moved(offset),
+        batch.controls.moved(offset),
     )
     states = engine.rollout(scene, start, controls).states
     pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)

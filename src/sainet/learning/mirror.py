@@ -1,28 +1,26 @@
-"""Pushes seen in a mirror: disks on an even table know no left and right.
+"""Mirrored pushes: disks on an even table move alike to the left and to the right.
 
-The push frame makes networks blind to where and which way a push goes, but not to its
-handedness; showing each push as often mirrored as not teaches them that.
+The push frame makes networks insensitive to where and in which direction a push goes,
+but not to its handedness; training on each push as often mirrored as not teaches that.
 """
 
-import equinox as eqx
+from dataclasses import replace
+
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool
 
 from sainet.datasets.batch import PushBatch
-from sainet.scenes.controls import Controls, PathControls
-from sainet.scenes.state import State
 
 _STREAM = 0x318808
-_PLACE = (1.0, -1.0)
 _POSE = (1.0, -1.0, -1.0)
-_MOTION = (*_POSE, *_POSE)
 
 
 def mirror_some(batch: PushBatch, seed: int, iteration: int) -> PushBatch:
     """Return the batch with about half of its pushes mirrored; drawn by the iteration.
 
-    The field of friction of a scene, which is no known part of a stored push, stays.
+    Scenes stay: a stored push has no field of friction.
     """
     rng = np.random.default_rng([_STREAM, seed, iteration])
     return mirror(batch, jnp.asarray(rng.random(batch.size) < 1 / 2))
@@ -31,38 +29,29 @@ def mirror_some(batch: PushBatch, seed: int, iteration: int) -> PushBatch:
 def mirror(batch: PushBatch, chosen: Bool[Array, " push"]) -> PushBatch:
     """Return the batch with the chosen pushes mirrored at the x axis of the table."""
 
-    def flip(values: Array, signs: tuple[float, ...] = ()) -> Array:
-        behind = [1] * (values.ndim - 1)
-        last = jnp.asarray(signs).reshape(1, *behind[1:], -1) if signs else -1.0
-        return jnp.where(chosen.reshape(-1, *behind), values * last, values)
+    def flip(values: Array) -> Array:
+        poses = np.resize(_POSE, values.shape[-1])  # and their rates, if packed motion
+        return values * poses.astype(values.dtype).reshape(
+            (1,) * (values.ndim - 1) + (-1,)
+        )
 
-    start = batch.initial
-    initial = State(
-        position=flip(start.position, _PLACE),
-        angle=flip(start.angle),
-        velocity=flip(start.velocity, _PLACE),
-        spin=flip(start.spin),
-        pusher_position=flip(start.pusher_position, _PLACE),
-        pusher_velocity=flip(start.pusher_velocity, _PLACE),
+    def choose(mirrored: Array, values: Array) -> Array:
+        return jnp.where(chosen.reshape(-1, *[1] * (values.ndim - 1)), mirrored, values)
+
+    known = batch.initial, batch.controls, batch.truth, batch.measured, batch.simulated
+    mirrored = (
+        batch.initial.mirrored(),
+        batch.controls.mirrored(),
+        *jax.tree.map(flip, known[2:]),
     )
-    return eqx.tree_at(
-        lambda b: (b.initial, b.controls, b.truth, b.measured, b.simulated),
+    initial, controls, truth, measured, simulated = jax.tree.map(
+        choose, mirrored, known
+    )
+    return replace(
         batch,
-        (
-            initial,
-            _flipped(batch.controls, flip),
-            flip(batch.truth, _MOTION),
-            flip(batch.measured, _POSE),
-            None if batch.simulated is None else flip(batch.simulated, _MOTION),
-        ),
-        is_leaf=lambda leaf: leaf is None,
+        initial=initial,
+        controls=controls,
+        truth=truth,
+        measured=measured,
+        simulated=simulated,
     )
-
-
-def _flipped(controls: Controls, flip) -> Controls:  # noqa: ANN001
-    if isinstance(controls, PathControls):
-        names = ("position", "velocity")
-    else:
-        names = ("force", "contact_offset")
-    values = [flip(getattr(controls, name), _PLACE) for name in names]
-    return eqx.tree_at(lambda c: [getattr(c, name) for name in names], controls, values)

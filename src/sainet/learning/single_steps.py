@@ -1,4 +1,4 @@
-"""Pushes cut into single steps: what the non-recurrent form is trained on."""
+"""Pushes cut into single steps: training data of the non-recurrent form."""
 
 import equinox as eqx
 import jax
@@ -7,7 +7,6 @@ from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
 from sainet.engines.base import AbstractEngine
-from sainet.scenes.controls import PathControls
 from sainet.scenes.state import State, pack_motion, unpack_motion
 
 
@@ -16,11 +15,11 @@ def to_single_steps(batch: PushBatch, engine: AbstractEngine | None) -> PushBatc
     """Return every step of every push as a push of its own, of one step.
 
     It starts from the true state, and the engine restarts there too (figure 2c of the
-    paper); its target is the true next state, so that no noise of the capture stands
-    between the two.
+    paper); its target is the true next state, free of motion-capture noise.
 
     Args:
         batch: pushes whose pusher follows a path, the truth known at every step.
+            (A force's pusher would count as staying at the start.)
         engine: predicts s-bar of each step; None for a network without an engine.
     """
     steps = batch.truth.shape[1]
@@ -44,12 +43,12 @@ def to_single_steps(batch: PushBatch, engine: AbstractEngine | None) -> PushBatc
 
 
 def _states_before(batch: PushBatch) -> State:
-    """Return the true state before each step; the pusher is where it should be."""
+    """Return the true state before each step; the pusher is on its path."""
     initial, controls = batch.initial, batch.controls
-    assert isinstance(controls, PathControls)
     motion = _shifted(pack_motion(initial), batch.truth)
-    pusher = _shifted(initial.pusher_position, controls.position)
-    velocity = _shifted(initial.pusher_velocity, controls.velocity)
+    path, rate = controls.pusher_motion(initial.pusher_position)
+    pusher = _shifted(initial.pusher_position, path)
+    velocity = _shifted(initial.pusher_velocity, rate)
     return unpack_motion(motion, pusher, velocity)
 
 

@@ -13,7 +13,7 @@ from sainet.learning.loss import LossWeights
 from sainet.learning.recipes import Objective
 from sainet.models.correctors.interaction import Scales
 from sainet.models.features import FeatureSet
-from sainet.models.frame import controls_to_frame, motion_to_frame, push_frame
+from sainet.models.frame import motion_to_frame, push_frame
 from sainet.models.inputs import Drive, Moment, drives, in_columns, still_features
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.scenes.state import pack_motion
@@ -41,7 +41,7 @@ def feature_scales(
     simulated = None
     if features.has_simulator and batch.simulated is not None:
         simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
-    drive = drives(controls_to_frame(batch.controls, frame), start, simulated)
+    drive = drives(batch.controls.in_frame(frame.origin, frame.angle), start, simulated)
     drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
     still = in_columns(still_features(batch.scene, frame))
     columns = jax.vmap(in_columns)((before, drive))

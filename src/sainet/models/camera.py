@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 from sainet.models.correctors.base import Purpose
 from sainet.models.dynamics import AbstractDynamics
 from sainet.scenes.camera import CameraOffset
-from sainet.scenes.controls import Controls, move_controls, move_pusher
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 
@@ -36,7 +36,7 @@ class OffsetCamera(AbstractDynamics):
 
     def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
         """Return the carry of the wrapped model at the state."""
-        return self.dynamics.begin(scene, move_pusher(state, self._offset))
+        return self.dynamics.begin(scene, state.with_pusher_moved(self._offset))
 
     def advance(
         self,
@@ -46,9 +46,9 @@ class OffsetCamera(AbstractDynamics):
         simulated: Trajectory | None = None,
     ) -> tuple[Any, Trajectory]:
         """Return the carry and the states after each step of the wrapped model."""
-        moved = move_controls(controls, self._offset)
+        moved = controls.moved(self._offset)
         carry, trajectory = self.dynamics.advance(scene, carry, moved, simulated)
-        return carry, Trajectory(move_pusher(trajectory.states, -self._offset))
+        return carry, Trajectory(trajectory.states.with_pusher_moved(-self._offset))
 
     @property
     def _offset(self) -> Float[Array, "2"]:

@@ -9,7 +9,6 @@ from jaxtyping import Array, Float
 
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors.base import AbstractCorrector, Purpose, Start
-from sainet.models.correctors.interaction import commanded_pusher
 from sainet.models.frame import push_frame
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
@@ -164,7 +163,8 @@ def stored_prediction(
         controls: of the push. Where a force drives the pusher its path is not stored:
             the trajectory then has it at its start, and `advance` must not continue.
     """
-    return Trajectory(unpack_motion(motion, *commanded_pusher(initial, controls)))
+    pusher = controls.pusher_motion(initial.pusher_position)
+    return Trajectory(unpack_motion(motion, *pusher))
 
 
 def predict(

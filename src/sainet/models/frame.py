@@ -10,7 +10,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from sainet.scenes.controls import Controls, ForceControls, PathControls
 from sainet.scenes.geometry import direction, rotate
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
@@ -58,17 +57,3 @@ def _turn(motion: Array, place: Array, angle: Array) -> Array:
         motion[..., 5:6],
     ]
     return jnp.concatenate(parts, axis=-1)
-
-
-def controls_to_frame(controls: Controls, frame: PushFrame) -> Controls:
-    """Turn controls from the table's frame into the push frame."""
-    angle = -frame.angle[..., None]
-    if isinstance(controls, PathControls):
-        place = controls.position - frame.origin[..., None, :]
-        return PathControls(rotate(place, angle), rotate(controls.velocity, angle))
-    return ForceControls(
-        force=rotate(controls.force, angle),
-        contact_offset=rotate(controls.contact_offset, -frame.angle),
-        pusher_mass=controls.pusher_mass,
-        damping=controls.damping,
-    )

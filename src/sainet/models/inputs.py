@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sainet.models.frame import PushFrame
-from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 
 
@@ -98,18 +98,9 @@ def drives(
         initial: packed motion at which both predictions start.
         simulated: packed s-bar after each step; None without an engine.
     """
-    action, pusher = _action(controls)
+    action, pusher = controls.action, controls.pusher_path
     if simulated is None:
         return Drive(action, pusher, None, None)
     whole = jnp.concatenate([initial[..., None, :, :], simulated], axis=-3)
     step = whole[..., 1:, :, :] - whole[..., :-1, :, :]
     return Drive(action, pusher, step[..., 0:3], step[..., 3:6])
-
-
-def _action(controls: Controls) -> tuple[Array, Array | None]:
-    if isinstance(controls, PathControls):
-        return controls.velocity, controls.position
-    offset = jnp.broadcast_to(
-        controls.contact_offset[..., None, :], controls.force.shape
-    )
-    return jnp.concatenate([controls.force, offset], axis=-1), None

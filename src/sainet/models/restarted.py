@@ -7,7 +7,7 @@ from jax import lax
 from sainet.models.correctors.base import Purpose
 from sainet.models.dynamics import AbstractDynamics
 from sainet.runs.errors import BadInput
-from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 
@@ -43,13 +43,13 @@ class Restarted(AbstractDynamics):
             BadInput: a force drives the pusher.
         """
         del simulated  # of a whole push; here the engine restarts at every step
-        if not isinstance(controls, PathControls):
+        if controls.pusher_path is None:
             raise BadInput(
                 "A network of single steps predicts only pushes of the robot setup: "
                 "the path of a pusher that a force drives is not known in advance."
             )
 
-        def step(state: State, control: PathControls) -> tuple[State, State]:
+        def step(state: State, control: Controls) -> tuple[State, State]:
             begun = self.model.begin(scene, state)
             _, trajectory = self.model.advance(scene, begun, control)
             return trajectory.final, trajectory.final

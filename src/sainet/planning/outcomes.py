@@ -9,8 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
-from sainet.scenes.controls import path_controls
-from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.pushes import Push, command_path, place_pusher
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, Trajectory, at_rest
@@ -69,11 +68,7 @@ def roll_pushes(
     dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
 ) -> Trajectory:
     """Return the motion of one push from each state; all share one batch axis."""
-    start, heading = place_pusher(scene, states, pushes), push_direction(states, pushes)
-    initial = at_rest(states.position, states.angle, start)
-    controls = path_controls(
-        pushes, start, heading, steps=SETTLED_STEPS, time_step=scene.time_step
-    )
+    initial, controls = command_path(scene, states, pushes, steps=SETTLED_STEPS)
     carry = dynamics.begin(scene, initial)
     return dynamics.advance(scene, carry, controls)[1]
 

@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from sainet.engines.base import AbstractEngine, roll_out
 from sainet.robots.base import AbstractRobot
-from sainet.scenes.controls import PathControls, path_controls
-from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.controls import PathControls
+from sainet.scenes.pushes import Push, command_path
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import FrictionField, Scene
 from sainet.scenes.shapes import pusher_gaps
@@ -69,11 +69,8 @@ class SimulatedRobot(AbstractRobot):
             lambda x: jnp.asarray(x)[None], (self.scene, self._seen, self.truth, push)
         )
         plain = eqx.tree_at(lambda s: s.friction_field, scene, None)
-        start, heading = place_pusher(plain, seen, one), push_direction(seen, one)
-        controls = path_controls(
-            one, start, heading, steps=PUSH_STEPS, time_step=scene.time_step
-        )
-        initial = at_rest(truth.position, truth.angle, start)
+        planned, controls = command_path(plain, seen, one, steps=PUSH_STEPS)
+        initial = at_rest(truth.position, truth.angle, planned.pusher_position)
         states = roll_out(self._engine, scene, initial, self._disturb(controls)).states
         end = jax.tree.map(lambda x: x[0, -1], states)
         self.truth = at_rest(end.position, end.angle, end.pusher_position)

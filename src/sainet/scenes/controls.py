@@ -1,16 +1,133 @@
 """Commands to the pusher over time, one class for each setup."""
 
-from typing import ClassVar
+import math
+from abc import abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.scenes.pushes import Push
-from sainet.scenes.state import State
+from sainet.scenes.geometry import rotate
 
 
-class PathControls(eqx.Module):
+class Pusher(NamedTuple):
+    """How the pusher resists a force."""
+
+    mass: float  # kg; infinite: contacts do not slow it
+    damping: float  # N s/m
+
+
+XY = tuple[Array, Array]  # one array for each axis
+
+
+class Controls(eqx.Module):
+    """Commands to the pusher, step by step; leading batch axes are optional."""
+
+    kind: ClassVar[str]  # the setup: a key of `CONTROLS`
+
+    @property
+    @abstractmethod
+    def pusher(self) -> Pusher:
+        """The mass and the damping of the pusher."""
+
+    @property
+    def steps(self) -> int:
+        """The number of steps."""
+        return self.command.shape[-2]
+
+    @property
+    @abstractmethod
+    def command(self) -> Float[Array, "*batch time 2"]:
+        """The command of each step, which `drive` takes: m or N."""
+
+    @property
+    @abstractmethod
+    def action(self) -> Float[Array, "*batch time action"]:
+        """Inputs of a network that depend on the commands only."""
+
+    @property
+    @abstractmethod
+    def pusher_path(self) -> Float[Array, "*batch time 2"] | None:
+        """Commanded pusher position (m) after each step; None: not commanded."""
+
+    @abstractmethod
+    def pusher_motion(
+        self, start: Float[Array, "*batch 2"]
+    ) -> tuple[Float[Array, "*batch time 2"], Float[Array, "*batch time 2"]]:
+        """Return the pusher's position (m) and velocity (m/s) without simulation.
+
+        Args:
+            start: its position before the first step, m.
+        """
+
+    @abstractmethod
+    def drive(self, position: XY, velocity: XY, command: XY, time_step: float) -> XY:
+        """Return the pusher's velocity (m/s) in one step without contact.
+
+        Args:
+            position: of the pusher before the step, m.
+            velocity: of the pusher before the step, m/s.
+            command: one step of `command`.
+            time_step: s.
+        """
+
+    @abstractmethod
+    def moved(self, offset: Float[Array, "*batch 2"]) -> "Controls":
+        """Return controls of a pusher displaced relative to the disks by `offset` (m).
+
+        Args:
+            offset: one for all pushes, or one for each.
+        """
+
+    def turned(self, angle: Float[Array, "*batch"]) -> "Controls":
+        """Return controls turned about the table's origin (rad)."""
+
+        def turn(vector: Array) -> Array:
+            later = (1,) * (vector.ndim - 1 - angle.ndim)
+            return rotate(vector, angle.reshape(angle.shape + later))
+
+        return jax.tree.map(turn, self)  # every array is a vector
+
+    def mirrored(self) -> "Controls":
+        """Return controls mirrored at the table's x axis."""
+        return jax.tree.map(lambda vector: vector.at[..., 1].multiply(-1), self)
+
+    @abstractmethod
+    def in_frame(
+        self, origin: Float[Array, "*batch 2"], angle: Float[Array, "*batch"]
+    ) -> "Controls":
+        """Return controls in a frame with this origin (m) and x axis (rad)."""
+
+    @abstractmethod
+    def arrays(self) -> dict[str, Array]:
+        """Return the stored arrays by name."""
+
+    @classmethod
+    @abstractmethod
+    def from_arrays(
+        cls,
+        arrays: Mapping[str, np.ndarray],
+        time: slice,
+        *,
+        pusher_mass: float,
+        damping: float,
+    ) -> "Controls":
+        """Return the controls of stored pushes.
+
+        Args:
+            arrays: as `arrays` returns them.
+            time: steps to keep.
+            pusher_mass: kg, where a force drives the pusher.
+            damping: N s/m, where a force drives the pusher.
+        """
+
+
+class PathControls(Controls):
     """The pusher follows a path (the robot setup)."""
 
     position: Float[Array, "*batch time 2"]  # m, commanded at the end of each step
@@ -19,12 +136,68 @@ class PathControls(eqx.Module):
     kind: ClassVar[str] = "robot"
 
     @property
-    def steps(self) -> int:
-        """The number of steps."""
-        return self.velocity.shape[-2]
+    def pusher(self) -> Pusher:
+        """A pusher that stays on its path."""
+        return Pusher(math.inf, 0.0)
+
+    @property
+    def command(self) -> Float[Array, "*batch time 2"]:
+        """The position at the end of each step, m."""
+        return self.position
+
+    @property
+    def action(self) -> Float[Array, "*batch time 2"]:
+        """The commanded velocity, m/s."""
+        return self.velocity
+
+    @property
+    def pusher_path(self) -> Float[Array, "*batch time 2"]:
+        """The commanded positions, m."""
+        return self.position
+
+    def pusher_motion(
+        self, start: Float[Array, "*batch 2"]
+    ) -> tuple[Float[Array, "*batch time 2"], Float[Array, "*batch time 2"]]:
+        """Return the commanded positions and velocities."""
+        return self.position, self.velocity
+
+    def drive(self, position: XY, velocity: XY, command: XY, time_step: float) -> XY:
+        """Return the velocity that ends the step on the path."""
+        (x, y), (next_x, next_y) = position, command
+        return (next_x - x) / time_step, (next_y - y) / time_step
+
+    def moved(self, offset: Float[Array, "*batch 2"]) -> "PathControls":
+        """Return a displaced path."""
+        offset = jnp.broadcast_to(offset[..., None, :], self.position.shape)
+        return PathControls(self.position + offset, self.velocity)
+
+    def in_frame(
+        self, origin: Float[Array, "*batch 2"], angle: Float[Array, "*batch"]
+    ) -> Controls:
+        """Return the path in the frame."""
+        return self.moved(-origin).turned(-angle)
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the stored arrays by name."""
+        return {"command_position": self.position, "command_velocity": self.velocity}
+
+    @classmethod
+    def from_arrays(
+        cls,
+        arrays: Mapping[str, np.ndarray],
+        time: slice,
+        *,
+        pusher_mass: float,
+        damping: float,
+    ) -> "PathControls":
+        """Return the paths of stored pushes; mass and damping have no effect."""
+        return cls(
+            position=jnp.asarray(arrays["command_position"][:, time]),
+            velocity=jnp.asarray(arrays["command_velocity"][:, time]),
+        )
 
 
-class ForceControls(eqx.Module):
+class ForceControls(Controls):
     """A force drives the pusher against a viscous damper (the direct-force setup)."""
 
     force: Float[Array, "*batch time 2"]  # N
@@ -35,69 +208,74 @@ class ForceControls(eqx.Module):
     kind: ClassVar[str] = "direct-force"
 
     @property
-    def steps(self) -> int:
-        """The number of steps."""
-        return self.force.shape[-2]
+    def pusher(self) -> Pusher:
+        """The mass and the damping of the pusher."""
+        return Pusher(self.pusher_mass, self.damping)
+
+    @property
+    def command(self) -> Float[Array, "*batch time 2"]:
+        """The force during each step, N."""
+        return self.force
+
+    @property
+    def action(self) -> Float[Array, "*batch time 4"]:
+        """The force (N) and the contact offset (m)."""
+        offset = jnp.broadcast_to(self.contact_offset[..., None, :], self.force.shape)
+        return jnp.concatenate([self.force, offset], axis=-1)
+
+    @property
+    def pusher_path(self) -> None:
+        """None: where the pusher moves depends on the disks."""
+
+    def pusher_motion(
+        self, start: Float[Array, "*batch 2"]
+    ) -> tuple[Float[Array, "*batch time 2"], Float[Array, "*batch time 2"]]:
+        """Return a pusher that stays at the start: the commands imply no motion."""
+        shape = self.force.shape
+        return jnp.broadcast_to(start[..., None, :], shape), jnp.zeros(shape)
+
+    def drive(self, position: XY, velocity: XY, command: XY, time_step: float) -> XY:
+        """Return v + dt / M (f - c v), an explicit step against the damper."""
+        gain = time_step / self.pusher_mass
+        keep = 1 - gain * self.damping
+        (vx, vy), (x, y) = velocity, command
+        return keep * vx + gain * x, keep * vy + gain * y
+
+    def moved(self, offset: Float[Array, "*batch 2"]) -> "ForceControls":
+        """Return forces with a displaced point of contact."""
+        offset = jnp.broadcast_to(offset, self.contact_offset.shape)
+        return eqx.tree_at(
+            lambda c: c.contact_offset, self, self.contact_offset + offset
+        )
+
+    def in_frame(
+        self, origin: Float[Array, "*batch 2"], angle: Float[Array, "*batch"]
+    ) -> Controls:
+        """Return forces and points of contact in the frame: from its disk."""
+        return self.turned(-angle)
+
+    def arrays(self) -> dict[str, Array]:
+        """Return the stored arrays by name."""
+        return {"force": self.force, "contact_offset": self.contact_offset}
+
+    @classmethod
+    def from_arrays(
+        cls,
+        arrays: Mapping[str, np.ndarray],
+        time: slice,
+        *,
+        pusher_mass: float,
+        damping: float,
+    ) -> "ForceControls":
+        """Return the forces of stored pushes."""
+        return cls(
+            force=jnp.asarray(arrays["force"][:, time]),
+            contact_offset=jnp.asarray(arrays["contact_offset"]),
+            pusher_mass=pusher_mass,
+            damping=damping,
+        )
 
 
-Controls = PathControls | ForceControls
-
-
-def path_controls(
-    push: Push,
-    start: Float[Array, "*batch 2"],
-    heading: Float[Array, "*batch 2"],
-    *,
-    steps: int,
-    time_step: float,
-) -> PathControls:
-    """Return a push at constant speed along a line that then holds.
-
-    Args:
-        push: its length and speed are used.
-        start: where the pusher starts, m.
-        heading: unit vector.
-        steps: how many steps the controls last, holding included.
-        time_step: s.
-    """
-    end_of_step = jnp.arange(1, steps + 1) * time_step
-    asked = jnp.multiply.outer(push.speed, end_of_step)
-    travelled = jnp.minimum(asked, push.length[..., None])
-    before = jnp.concatenate([jnp.zeros_like(travelled[..., :1]), travelled], -1)[
-        ..., :-1
-    ]
-    speed = (travelled - before) / time_step
-    return PathControls(
-        position=start[..., None, :] + travelled[..., None] * heading[..., None, :],
-        velocity=speed[..., None] * heading[..., None, :],
-    )
-
-
-def force_controls(
-    state: State, heading: Float[Array, "*batch 2"], *, force: float, steps: int
-) -> ForceControls:
-    """Return a constant force (N) along a heading for so many steps."""
-    batch = heading.shape[:-1]
-    return ForceControls(
-        force=jnp.broadcast_to(force * heading[..., None, :], (*batch, steps, 2)),
-        contact_offset=state.pusher_position - state.position[..., 0, :],
-    )
-
-
-def move_pusher(state: State, offset: Float[Array, "*batch 2"]) -> State:
-    """Return states with the pusher moved by an offset (m), one or one for each."""
-    moved = state.pusher_position + jnp.broadcast_to(
-        offset, state.pusher_position.shape
-    )
-    return eqx.tree_at(lambda s: s.pusher_position, state, moved)
-
-
-def move_controls(controls: Controls, offset: Float[Array, "*batch 2"]) -> Controls:
-    """Return controls of a pusher that is moved by an offset (m)."""
-    if isinstance(controls, ForceControls):
-        here = jnp.broadcast_to(offset, controls.contact_offset.shape)
-        contact = controls.contact_offset + here
-        return eqx.tree_at(lambda c: c.contact_offset, controls, contact)
-    path = controls.position
-    path = path + jnp.broadcast_to(offset[..., None, :], path.shape)
-    return eqx.tree_at(lambda c: c.position, controls, path)
+CONTROLS: Mapping[str, type[Controls]] = MappingProxyType(
+    {each.kind: each for each in (PathControls, ForceControls)}
+)

@@ -1,13 +1,14 @@
-"""Pushes: the parameters of one, the grid of 72, and the pusher's start."""
+"""Pushes: their parameters, the grid of 72, the pusher's start and the commands."""
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.geometry import direction, unit
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State
+from sainet.scenes.state import State, at_rest
 
 
 class Push(eqx.Module):
@@ -70,3 +71,69 @@ def place_pusher(
 def push_direction(state: State, push: Push) -> Float[Array, "*batch 2"]:
     """Return the unit vector along which the pusher moves or pushes."""
     return unit(push_axis(state) + push.contact_angle + push.direction)
+
+
+def command_path(
+    scene: Scene, state: State, push: Push, *, steps: int, gap: float = 0.0
+) -> tuple[State, PathControls]:
+    """Place the pusher and command a straight push that then holds.
+
+    Args:
+        scene: of each push.
+        state: observed poses of the disks.
+        push: one for each scene.
+        steps: length of the controls, holding included.
+        gap: between the pusher and disk 1 at the start, m.
+
+    Returns:
+        The state at rest with the pusher at the start, and the controls.
+    """
+    initial, heading = _placed(scene, state, push, gap), push_direction(state, push)
+    end_of_step = jnp.arange(1, steps + 1) * scene.time_step
+    distance = jnp.multiply.outer(push.speed, end_of_step)
+    travelled = jnp.minimum(distance, push.length[..., None])
+    before = jnp.concatenate([jnp.zeros_like(travelled[..., :1]), travelled], -1)[
+        ..., :-1
+    ]
+    speed = (travelled - before) / scene.time_step
+    along = travelled[..., None] * heading[..., None, :]
+    return initial, PathControls(
+        position=initial.pusher_position[..., None, :] + along,
+        velocity=speed[..., None] * heading[..., None, :],
+    )
+
+
+def command_force(
+    scene: Scene,
+    state: State,
+    push: Push,
+    *,
+    force: float,
+    steps: int,
+    gap: float = 0.0,
+) -> tuple[State, ForceControls]:
+    """Place the pusher and command a constant force along the push direction.
+
+    Args:
+        scene: of each push.
+        state: observed poses of the disks.
+        push: one for each scene; its length and speed have no effect.
+        force: N.
+        steps: length of the controls.
+        gap: between the pusher and disk 1 at the start, m.
+
+    Returns:
+        The state at rest with the pusher at the start, and the controls.
+    """
+    initial, heading = _placed(scene, state, push, gap), push_direction(state, push)
+    shape = (*heading.shape[:-1], steps, 2)
+    return initial, ForceControls(
+        force=jnp.broadcast_to(force * heading[..., None, :], shape),
+        contact_offset=initial.pusher_position - initial.position[..., 0, :],
+    )
+
+
+def _placed(scene: Scene, state: State, push: Push, gap: float) -> State:
+    return at_rest(
+        state.position, state.angle, place_pusher(scene, state, push, gap=gap)
+    )

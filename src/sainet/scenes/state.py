@@ -26,6 +26,27 @@ class State(eqx.Module):
         """The number of disks."""
         return self.angle.shape[-1]
 
+    def with_pusher_moved(self, offset: Float[Array, "*#batch 2"]) -> "State":
+        """Return states with the pusher displaced by an offset (m)."""
+        offset = jnp.broadcast_to(offset, self.pusher_position.shape)
+        moved = self.pusher_position + offset
+        return eqx.tree_at(lambda s: s.pusher_position, self, moved)
+
+    def mirrored(self) -> "State":
+        """Return states mirrored at the table's x axis."""
+
+        def flip(vector: Array) -> Array:
+            return vector.at[..., 1].multiply(-1)
+
+        return State(
+            position=flip(self.position),
+            angle=-self.angle,
+            velocity=flip(self.velocity),
+            spin=-self.spin,
+            pusher_position=flip(self.pusher_position),
+            pusher_velocity=flip(self.pusher_velocity),
+        )
+
 
 class Trajectory(eqx.Module):
     """States after each step, without the initial state.

@@ -4,7 +4,6 @@ The ground truth is Bullet without noise; all engines have the true properties. 
 is not isotropic: its difference from itself is the best possible result.
 """
 
-import equinox as eqx
 import jax.numpy as jnp
 import msgspec
 import numpy as np
@@ -19,7 +18,7 @@ from sainet.evaluation.summary import summarise
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
-from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -48,7 +47,7 @@ class TurnedEngine(AbstractEngine):
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the rollout of the wrapped engine in the rotated scene."""
         turned = turn_state(initial, self.angle)
-        controls = turn_controls(controls, self.angle)
+        controls = controls.turned(jnp.asarray(self.angle))
         states = self.engine.rollout(scene, turned, controls).states
         return Trajectory(turn_state(states, -self.angle))
 
@@ -63,16 +62,6 @@ def turn_state(state: State, angle: float) -> State:
         pusher_position=rotate(state.pusher_position, jnp.asarray(angle)),
         pusher_velocity=rotate(state.pusher_velocity, jnp.asarray(angle)),
     )
-
-
-def turn_controls(controls: Controls, angle: float) -> Controls:
-    """Return controls rotated about the origin of the table (rad)."""
-    turn = jnp.asarray(angle)
-    if isinstance(controls, PathControls):
-        path = rotate(controls.position, turn), rotate(controls.velocity, turn)
-        return PathControls(*path)
-    turned = rotate(controls.force, turn), rotate(controls.contact_offset, turn)
-    return eqx.tree_at(lambda c: (c.force, c.contact_offset), controls, turned)
 
 
 def run(scale: Scale, chain: Chain) -> Result:

@@ -10,7 +10,7 @@ from jaxtyping import Array
 
 from sainet.engines.base import AbstractEngine
 from sainet.runs.errors import BadScene, MissingExtra
-from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
@@ -63,7 +63,7 @@ class BulletEngine(AbstractEngine):
 
 def _jobs(scene: Scene, initial: State, controls: Controls) -> list["Job"]:
     """Return the numbers that define each push of a batch."""
-    from sainet.engines.bullet.world import Driven, Job
+    from sainet.engines.bullet.world import Job
 
     axes = len(scene.batch_shape)
     arrays = _arrays(scene, initial, controls)
@@ -71,14 +71,12 @@ def _jobs(scene: Scene, initial: State, controls: Controls) -> list["Job"]:
         name: np.asarray(x, np.float64).reshape(-1, *x.shape[axes:])
         for name, x in arrays.items()
     }
-    driven = None
-    if isinstance(controls, ForceControls):
-        driven = Driven(float(controls.pusher_mass), float(controls.damping))
     return [
         Job(
             **{name: x[row] for name, x in rows.items() if name not in _FIELD},
             field=tuple(rows[n][row] for n in _FIELD) if "wave" in rows else None,
-            driven=driven,
+            pusher_mass=float(controls.pusher.mass),
+            damping=float(controls.pusher.damping),
             time_step=float(scene.time_step),
         )
         for row in range(len(rows["mass"]))
@@ -100,9 +98,7 @@ def _arrays(scene: Scene, initial: State, controls: Controls) -> dict[str, Array
         "pusher": jnp.concatenate(
             [initial.pusher_position, initial.pusher_velocity], axis=-1
         ),
-        "command": controls.position
-        if isinstance(controls, PathControls)
-        else controls.force,
+        "command": controls.command,
     }
     if scene.friction_field is not None:
         arrays |= {name: getattr(scene.friction_field, name) for name in _FIELD}

@@ -27,13 +27,6 @@ _PUSHABLE = 1  # collision group of disks and pusher; each table plane has its o
 _NEVER_SLEEPS = 2  # pybullet.ACTIVATION_STATE_DISABLE_SLEEPING
 
 
-class Driven(NamedTuple):
-    """Dynamics of a pusher driven by a force."""
-
-    mass: float  # kg
-    damping: float  # N s/m
-
-
 class Job(NamedTuple):
     """Numbers that define one push."""
 
@@ -47,8 +40,14 @@ class Job(NamedTuple):
     pusher: Float[np.ndarray, " 4"]  # position and velocity
     command: Float[np.ndarray, "time 2"]  # positions (m) or forces (N)
     field: tuple[np.ndarray, np.ndarray, float] | None  # wave, phase, amplitude
-    driven: Driven | None  # None: the pusher follows a path
+    pusher_mass: float  # kg; infinite: it follows a path, and contacts do not slow it
+    damping: float  # N s/m, of a pusher that a force drives
     time_step: float
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether the pusher follows a path."""
+        return math.isinf(self.pusher_mass)
 
 
 class Moved(NamedTuple):
@@ -152,7 +151,7 @@ class World:
             height=2 * _HEIGHT,
             physicsClientId=client,
         )
-        mass = _GUIDED_MASS if job.driven is None else job.driven.mass
+        mass = _GUIDED_MASS if job.is_guided else job.pusher_mass
         middle = [x, y, _CLEARANCE + _HEIGHT / 2]
         body = self._bullet.createMultiBody(
             mass, shape, basePosition=middle, physicsClientId=client
@@ -198,13 +197,13 @@ class World:
     def _drive(self, job: Job, pusher: np.ndarray, command: np.ndarray) -> None:
         """Apply the command and cancel gravity: no plane supports the pusher."""
         body, client = self._pusher, self._client
-        if job.driven is None:
+        if job.is_guided:
             vx, vy = (command - pusher[0:2]) / job.time_step
             lift = GRAVITY * job.time_step
             self._bullet.resetBaseVelocity(body, [vx, vy, lift], [0, 0, 0], client)
             return
-        fx, fy = command - job.driven.damping * pusher[2:4]
-        force = [fx, fy, job.driven.mass * GRAVITY]
+        fx, fy = command - job.damping * pusher[2:4]
+        force = [fx, fy, job.pusher_mass * GRAVITY]
         self._bullet.applyExternalForce(
             body, -1, force, [0, 0, 0], self._bullet.LINK_FRAME, physicsClientId=client
         )

@@ -16,7 +16,7 @@ from sainet.engines.planar.bodies import (
 from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
 from sainet.engines.planar.solver import Step, solve_all_pairs
 from sainet.engines.planar.table import Twist
-from sainet.scenes.controls import Controls, ForceControls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 
@@ -44,7 +44,7 @@ class PlanarEngine(AbstractEngine):
             moved = self._step(scene, properties, bodies, controls, control)
             return moved, to_state(moved)
 
-        command = jnp.moveaxis(_command(controls), -2, 0)
+        command = jnp.moveaxis(controls.command, -2, 0)
         _, states = lax.scan(advance, to_bodies(initial), command)
         return Trajectory(_time_after_batch(states, len(scene.batch_shape)))
 
@@ -60,17 +60,15 @@ class PlanarEngine(AbstractEngine):
         Args:
             scene: any batch shape.
             state: of the same batch shape.
-            controls: says how the pusher is driven.
-            control: the pusher's commanded position at the end of the step (m) when
-                it follows a path, the force on it (N) when a force drives it.
+            controls: drive the pusher.
+            control: one step of `controls.command`.
         """
         properties = self._properties(scene, controls)
         bodies = to_bodies(state)
         return to_state(self._step(scene, properties, bodies, controls, control))
 
     def _properties(self, scene: Scene, controls: Controls) -> Properties:
-        driven = isinstance(controls, ForceControls)
-        inverse_mass = 1 / controls.pusher_mass if driven else 0.0
+        inverse_mass = 1 / controls.pusher.mass
         return to_properties(scene, self.pressure_radius_ratio, inverse_mass)
 
     def _step(
@@ -92,23 +90,16 @@ class PlanarEngine(AbstractEngine):
         )
 
 
-def _command(controls: Controls) -> Float[Array, "*batch time 2"]:
-    return controls.position if isinstance(controls, PathControls) else controls.force
-
-
 def _drive(
     bodies: Bodies, controls: Controls, control: Array, time_step: float
 ) -> Bodies:
     """Return the bodies with the pusher's velocity before contact."""
-    x, y = control[..., 0], control[..., 1]
-    if isinstance(controls, PathControls):
-        vx = (x - bodies.x[-1]) / time_step
-        vy = (y - bodies.y[-1]) / time_step
-    else:
-        gain = time_step / controls.pusher_mass
-        keep = 1 - gain * controls.damping
-        vx = keep * bodies.velocity_x[-1] + gain * x
-        vy = keep * bodies.velocity_y[-1] + gain * y
+    vx, vy = controls.drive(
+        (bodies.x[-1], bodies.y[-1]),
+        (bodies.velocity_x[-1], bodies.velocity_y[-1]),
+        (control[..., 0], control[..., 1]),
+        time_step,
+    )
     return bodies._replace(
         velocity_x=(*bodies.velocity_x[:-1], vx),
         velocity_y=(*bodies.velocity_y[:-1], vy),

@@ -20,7 +20,7 @@ from sainet.models.correctors.base import (
     Start,
 )
 from sainet.models.features import FeatureSet
-from sainet.models.frame import controls_to_frame, motion_from_frame, motion_to_frame
+from sainet.models.frame import motion_from_frame, motion_to_frame
 from sainet.models.inputs import (
     Drive,
     Moment,
@@ -31,9 +31,9 @@ from sainet.models.inputs import (
     still_features,
 )
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
-from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
+from sainet.scenes.state import Trajectory, pack_motion, unpack_motion
 
 WIDTHS = (128, 64, 32, 16)
 EFFECT = WIDTHS[-1]
@@ -191,7 +191,7 @@ class InteractionNetwork(AbstractCorrector):
         motion = jax.vmap(motion_from_frame, in_axes=(0, None), out_axes=1)(
             local, start.frame
         )
-        pusher, velocity = commanded_pusher(start.predicted, controls)
+        pusher, velocity = controls.pusher_motion(start.predicted.pusher_position)
         return Prediction(Trajectory(unpack_motion(motion, pusher, velocity)))
 
     def in_frame(
@@ -221,17 +221,8 @@ class InteractionNetwork(AbstractCorrector):
             )
         if start.simulated is not None:
             before = motion_to_frame(pack_motion(start.simulated), frame)
-        drive = drives(controls_to_frame(controls, frame), before, path)
+        drive = drives(controls.in_frame(frame.origin, frame.angle), before, path)
         return (unroll)(self, initial, still_features(scene, frame), drive)
-
-
-def commanded_pusher(state: State, controls: Controls) -> tuple[Array, Array]:
-    """Return the pusher's path, m and m/s; where a force drives it, it is unknown."""
-    if isinstance(controls, PathControls):
-        return controls.position, controls.velocity
-    shape = controls.force.shape
-    still = jnp.broadcast_to(state.pusher_position[..., None, :], shape)
-    return still, jnp.zeros(shape)
 
 
 def _silenced(layers: Layers) -> Layers:
