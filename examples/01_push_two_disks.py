@@ -10,14 +10,7 @@ from sainet.scenes.pushes import command_path
 from sainet.scenes.state import at_rest
 
 # One scene: two steel disks on ABS, the second in front of the first.
-scene = Scene(
-    mass=jnp.array([0.9, 1.0]),
-    radius=jnp.array([0.054, 0.059]),
-    table_friction=jnp.array(0.15),
-    disk_friction=jnp.array(0.25),
-    pusher_friction=jnp.array(0.25),
-    pusher_radius=jnp.array(0.0048),
-)
+scene = Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
 position = jnp.array([[0.0, 0.0], [0.113, 0.0]])
 
 # The same scene 72 times, pushed in 72 ways.

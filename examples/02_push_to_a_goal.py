@@ -11,26 +11,16 @@ from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.state import at_rest
 from sainet.tasks.push_to_goal import PushToGoal
 from sainet.worlds.noise_config import NoiseConfig
+from sainet.worlds.setups import RobotSetup
+from sainet.worlds.world import SimulatedWorld
 
-# The world: rough, noisy, and with a friction that nobody tells the model.
-radius = jnp.array([0.054, 0.059])
-scene = Scene(
-    mass=jnp.array([0.9, 1.0]),
-    radius=radius,
-    table_friction=jnp.array(0.12),
-    disk_friction=jnp.array(0.25),
-    pusher_friction=jnp.array(0.25),
-    pusher_radius=jnp.array(0.0048),
-)
-touching = jnp.array([[0.0, 0.0], [radius.sum(), 0.0]])
+# The world: a rough table, noise, and a friction that is no input of the model.
+scene = Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059], table_friction=0.12)
+touching = jnp.array([[0.0, 0.0], [scene.radius.sum(), 0.0]])
 state = at_rest(touching, jnp.zeros(2), jnp.array([-0.1, 0.0]))
-robot = SimulatedRobot(
-    make_engine("planar"),
-    scene,
-    state,
-    noise=NoiseConfig(),
-    rng=np.random.default_rng(0),
-)
+engine, rng = make_engine("planar"), np.random.default_rng(0)
+world = SimulatedWorld(engine, RobotSetup(), NoiseConfig(), rng)
+robot = SimulatedRobot(world, scene, state)
 
 # The goal: 100 mm ahead of disk 2, 20 mm to the side.
 task = PushToGoal(touching[1] + jnp.array([0.10, 0.02]))

@@ -9,13 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.sampling import Draws, draw
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.scenes.controls import Controls, PathControls
-from sainet.scenes.pushes import Push, command_force, command_path
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, at_rest
+from sainet.scenes.state import State
+from sainet.worlds.sampling import Draws, draw
+from sainet.worlds.setups import SETUPS
 from support import require
 
 FAR = 10.0  # m, where a pusher touches nothing
@@ -155,22 +155,8 @@ def push_of(
     config: GenerateConfig, scene: Scene, draws: Draws, steps: int
 ) -> tuple[State, Controls]:
     """The initial states and the controls of drawn pushes."""
-    position = jnp.asarray(draws.position, jnp.float32)
-    resting = at_rest(position, jnp.zeros_like(scene.mass), position[:, 0])
-    push = Push(
-        *(
-            jnp.asarray(values, jnp.float32)
-            for values in (
-                draws.contact_angle,
-                draws.direction,
-                draws.stroke,
-                draws.speed,
-            )
-        )
-    )
-    if config.setup == "robot":
-        return command_path(scene, resting, push, steps=steps)
-    return command_force(scene, resting, push, force=8.0, steps=steps)
+    setup = SETUPS[config.setup](config)
+    return setup.command(scene, draws.state(), draws.push(), steps)
 
 
 def first_steps(controls: Controls, steps: int) -> Controls:

@@ -7,8 +7,9 @@ import sys
 import pytest
 
 from sainet.cli.entry import run
-from sainet.datasets.config import GenerateConfig, bounds
+from sainet.datasets.config import GenerateConfig
 from sainet.runs.errors import BadInput, BadSetting
+from sainet.worlds.config import bounds
 from sainet.worlds.noise_config import NoiseConfig
 from support import SOURCE
 

@@ -13,6 +13,8 @@ from sainet.planning.outcomes import roll_pushes
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.pushes import PushGrid
 from sainet.worlds.noise_config import NoiseConfig, at_level
+from sainet.worlds.setups import RobotSetup
+from sainet.worlds.world import SimulatedWorld
 
 QUIET = at_level(NoiseConfig(), "none")
 PUSH = jax.tree.map(lambda x: x[33], PushGrid().pushes())
@@ -20,7 +22,8 @@ PUSH = jax.tree.map(lambda x: x[33], PushGrid().pushes())
 
 def robot(noise=QUIET, seed=0):
     engine, rng = make_engine("planar"), np.random.default_rng(seed)
-    return SimulatedRobot(engine, scene(), touching(), noise=noise, rng=rng)
+    world = SimulatedWorld(engine, RobotSetup(), noise, rng, np.float32)
+    return SimulatedRobot(world, scene(), touching())
 
 
 def test_without_noise_the_robot_equals_the_engine():

@@ -7,7 +7,7 @@ import pytest
 
 from contracts.worlds import make_scene, moving
 from sainet.runs.errors import BadScene
-from sainet.scenes.scene import check_scene
+from sainet.scenes.scene import Scene, check_scene
 from sainet.scenes.shapes import pair_gaps, pusher_gaps
 from sainet.scenes.state import (
     Trajectory,
@@ -77,7 +77,7 @@ def test_trajectories_have_a_final_state_and_bad_steps():
 def test_properties_must_be_positive(name, value):
     values = getattr(SCENE, name)
     scene = with_value(SCENE, name, values.at[(0,) * values.ndim].set(value))
-    with pytest.raises(BadScene, match=f"^x.csv: {name} is .*; it must be positive"):
+    with pytest.raises(BadScene, match=f"^x.csv: {name} is .*; it must be from "):
         check_scene(scene, "x.csv")
 
 
@@ -85,7 +85,7 @@ def test_properties_must_be_positive(name, value):
 def test_frictions_must_not_be_negative(name):
     check_scene(with_value(SCENE, name, jnp.zeros(1)))
     for value in (-0.1, np.nan, np.inf):
-        with pytest.raises(BadScene, match=f"{name} is .* zero or positive"):
+        with pytest.raises(BadScene, match=f"{name} is .* must be from 0 to 10"):
             check_scene(with_value(SCENE, name, jnp.full(1, value)))
 
 
@@ -103,3 +103,15 @@ def test_states_must_be_finite(name, value):
     state = with_value(STATE, name, values.at[(0,) * values.ndim].set(value))
     with pytest.raises(BadScene, match=f"row 3: {name} holds NaN"):
         check_state(state, "row 3")
+
+
+def test_a_scene_of_plain_numbers_is_checked():
+    scene = Scene.disks([0.9, 1.0], [0.054, 0.059], table_friction=0.2)
+    assert (scene.body_count, scene.batch_shape) == (2, ())
+    assert float(scene.table_friction) == pytest.approx(0.2)
+    with pytest.raises(BadScene, match=r"scene: mass is 900 \(in grams\?\)"):
+        Scene.disks([900.0], [0.05])
+    with pytest.raises(BadScene, match="2 masses and 1 radii"):
+        Scene.disks([1.0, 1.0], [0.05])
+    with pytest.raises(BadScene, match="time_step is 0; it must be from"):
+        Scene.disks([1.0], [0.05], time_step=0.0)

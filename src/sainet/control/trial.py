@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -14,13 +13,14 @@ from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
+from sainet.worlds.config import WorldConfig, bounds
 from sainet.worlds.noise_config import NoiseConfig, at_level
+from sainet.worlds.setups import RobotSetup
+from sainet.worlds.world import SimulatedWorld
 
 # True properties of the disks, which differ from the assumed properties.
 MASS = (0.9, 1.0)  # kg
 RADIUS = (0.054, 0.059)  # m
-CONTACT_FRICTION, PUSHER_RADIUS = 0.25, 0.0048
-_TABLE_FRICTION = (0.05, 0.25)
 _WORLD = 0x3071D
 
 
@@ -35,15 +35,14 @@ class Trial(NamedTuple):
 def make_trial(config: ControlConfig, index: int) -> Trial:
     """Return the world and the goal of one trial, equal for all models and planners."""
     rng = np.random.default_rng([_WORLD, config.seed, index])
-    true = _scene(MASS, RADIUS, config.disks, float(rng.uniform(*_TABLE_FRICTION)))
+    friction = float(rng.uniform(*bounds(WorldConfig.table_friction)))
+    true = _scene(MASS, RADIUS, config.disks, friction)
     state = _in_a_row(np.asarray(true.radius))
-    robot = SimulatedRobot(
-        make_engine(config.world),
-        true,
-        state,
-        noise=at_level(NoiseConfig(), config.noise_level),
-        rng=rng,
+    noise = at_level(NoiseConfig(), config.noise_level)
+    world = SimulatedWorld(
+        make_engine(config.world), RobotSetup(), noise, rng, np.float32
     )
+    robot = SimulatedRobot(world, true, state)
     moved = config.disks - 1
     goal = draw_goal(
         config.goals,
@@ -67,19 +66,11 @@ def _scene(
 ) -> Scene:
     """Return a scene; disks beyond the second have the mean of both values."""
 
-    def each(values: tuple[float, ...]) -> jax.Array:
+    def each(values: tuple[float, ...]) -> tuple[float, ...]:
         mean = sum(values) / len(values)
-        return jnp.array((*values, *[mean] * disks)[:disks], jnp.float32)
+        return (*values, *[mean] * disks)[:disks]
 
-    contact = jnp.float32(CONTACT_FRICTION)
-    return Scene(
-        mass=each(mass),
-        radius=each(radius),
-        table_friction=jnp.float32(friction),
-        disk_friction=contact,
-        pusher_friction=contact,
-        pusher_radius=jnp.float32(PUSHER_RADIUS),
-    )
+    return Scene.disks(each(mass), each(radius), table_friction=friction)
 
 
 def _in_a_row(radius: np.ndarray) -> State:

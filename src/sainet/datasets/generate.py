@@ -7,7 +7,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.sampling import chunk_generator, draw
 from sainet.datasets.schema import StoreInfo
 from sainet.datasets.simulate import simulate_chunk, store_info
 from sainet.datasets.store import Store, open_store
@@ -25,6 +24,7 @@ from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import require
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
+from sainet.worlds.sampling import chunk_generator, draw
 
 _log = logging.getLogger(__name__)
 

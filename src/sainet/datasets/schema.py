@@ -1,7 +1,7 @@
 """The arrays of a dataset: dimensions, units, meaning and range of each."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -24,6 +24,7 @@ from sainet.scenes.quantities import (
     Quantity,
     TimeStep,
 )
+from sainet.worlds.config import SetupName
 
 Arrays = dict[str, np.ndarray]  # of some pushes, by the names of variables
 
@@ -31,7 +32,6 @@ FORMAT_VERSION = 2
 RECORDED = "recorded"  # instead of the engine that made the ground truth
 MOTION_UNITS = "m m rad m/s m/s rad/s"
 
-Kind = Literal["robot", "direct-force"]
 # Part of a file name: of an engine or a model.
 _Name = Annotated[
     str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=100)
@@ -46,7 +46,7 @@ def _count(high: int) -> msgspec.Meta:
 class StoreInfo(msgspec.Struct, frozen=True, kw_only=True):
     """Properties that all pushes of a dataset share; stored as its attributes."""
 
-    kind: Kind
+    kind: SetupName
     pushes: Annotated[int, _count(MOST_PUSHES)]
     bodies: Annotated[int, _count(MOST_DISKS)]
     steps: Annotated[int, _count(MOST_STEPS)]  # of the longest push
@@ -133,25 +133,26 @@ _ALWAYS = {
     ),
 }
 
-_ROBOT = {
-    "command_position": Variable(
-        _PATH, "m", "commanded pusher after each step", (POSITION,)
-    ),
-    "command_velocity": Variable(
-        _PATH, "m/s", "commanded velocity during each step", (VELOCITY,)
-    ),
-}
-
-_FORCE = {
-    "force": Variable(
-        _PATH,
-        "N",
-        "commanded force on the pusher during each step",
-        (FORCE,),
-    ),
-    "contact_offset": Variable(
-        ("push", "xy"), "m", "pusher minus disk 1 at the start", (POSITION,)
-    ),
+_COMMANDS: dict[SetupName, dict[str, Variable]] = {
+    "robot": {
+        "command_position": Variable(
+            _PATH, "m", "commanded pusher after each step", (POSITION,)
+        ),
+        "command_velocity": Variable(
+            _PATH, "m/s", "commanded velocity during each step", (VELOCITY,)
+        ),
+    },
+    "direct-force": {
+        "force": Variable(
+            _PATH,
+            "N",
+            "commanded force on the pusher during each step",
+            (FORCE,),
+        ),
+        "contact_offset": Variable(
+            ("push", "xy"), "m", "pusher minus disk 1 at the start", (POSITION,)
+        ),
+    },
 }
 
 
@@ -163,8 +164,7 @@ def chunk_shape(info: StoreInfo, variable: Variable) -> tuple[int, ...]:
 
 def variables(info: StoreInfo) -> dict[str, Variable]:
     """Return every array of such a store by its name."""
-    found = dict(_ALWAYS)
-    found |= _ROBOT if info.kind == "robot" else _FORCE
+    found = _ALWAYS | _COMMANDS[info.kind]
     if info.has_measurements:
         found["measured"] = Variable(
             ("push", "time", "body", "pose"),

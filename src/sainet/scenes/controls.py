@@ -77,6 +77,10 @@ class Controls(eqx.Module):
         """
 
     @abstractmethod
+    def with_command(self, command: Float[Array, "*batch time 2"]) -> "Controls":
+        """Return controls with another command, for example with errors."""
+
+    @abstractmethod
     def moved(self, offset: Float[Array, "*batch 2"]) -> "Controls":
         """Return controls of a pusher displaced relative to the disks by `offset` (m).
 
@@ -166,6 +170,10 @@ class PathControls(Controls):
         (x, y), (next_x, next_y) = position, command
         return (next_x - x) / time_step, (next_y - y) / time_step
 
+    def with_command(self, command: Float[Array, "*batch time 2"]) -> "PathControls":
+        """Return another path; the commanded velocity stays."""
+        return PathControls(command, self.velocity)
+
     def moved(self, offset: Float[Array, "*batch 2"]) -> "PathControls":
         """Return a displaced path."""
         offset = jnp.broadcast_to(offset[..., None, :], self.position.shape)
@@ -240,6 +248,10 @@ class ForceControls(Controls):
         keep = 1 - gain * self.damping
         (vx, vy), (x, y) = velocity, command
         return keep * vx + gain * x, keep * vy + gain * y
+
+    def with_command(self, command: Float[Array, "*batch time 2"]) -> "ForceControls":
+        """Return other forces."""
+        return eqx.tree_at(lambda c: c.force, self, command)
 
     def moved(self, offset: Float[Array, "*batch 2"]) -> "ForceControls":
         """Return forces with a displaced point of contact."""

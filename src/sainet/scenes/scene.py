@@ -4,16 +4,22 @@ Units are metres, radians, kilograms and seconds, in the table frame. Leading ba
 are optional; there is at least one disk.
 """
 
+from collections.abc import Sequence
+
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
+from sainet.scenes.quantities import (
+    FRICTION,
+    MASS,
+    PUSHER_RADIUS,
+    RADIUS,
+    TIME_STEP_RANGE,
+)
 
 GRAVITY = 9.81  # m/s^2
-
-
 TIME_STEP = 1 / 240  # s, the paper's
 
 
@@ -54,6 +60,49 @@ class Scene(eqx.Module):
     friction_field: FrictionField | None = None
     time_step: float = eqx.field(static=True, default=TIME_STEP)  # s
 
+    @classmethod
+    def disks(
+        cls,
+        mass: Sequence[float],
+        radius: Sequence[float],
+        *,
+        table_friction: float = 0.15,
+        disk_friction: float = 0.25,
+        pusher_friction: float = 0.25,
+        pusher_radius: float = 0.0048,
+        time_step: float = TIME_STEP,
+    ) -> "Scene":
+        """Return one scene from plain numbers.
+
+        Args:
+            mass: of each disk, kg.
+            radius: of each disk, m.
+            table_friction: between a disk and the table.
+            disk_friction: between two disks.
+            pusher_friction: between the pusher and a disk.
+            pusher_radius: m.
+            time_step: s.
+
+        Raises:
+            BadScene: a value is out of its range, or masses and radii differ in number.
+        """
+        if len(mass) != len(radius):
+            raise BadScene(
+                f"scene: it has {len(mass)} masses and {len(radius)} radii; give one "
+                "of each for every disk."
+            )
+        scene = cls(
+            mass=jnp.asarray(mass, jnp.float32),
+            radius=jnp.asarray(radius, jnp.float32),
+            table_friction=jnp.float32(table_friction),
+            disk_friction=jnp.float32(disk_friction),
+            pusher_friction=jnp.float32(pusher_friction),
+            pusher_radius=jnp.float32(pusher_radius),
+            time_step=time_step,
+        )
+        check_scene(scene)
+        return scene
+
     @property
     def body_count(self) -> int:
         """The number of disks."""
@@ -65,27 +114,27 @@ class Scene(eqx.Module):
         return self.mass.shape[:-1]
 
 
-_POSITIVE = ("mass", "radius", "pusher_radius")
-
-
-_NOT_NEGATIVE = ("table_friction", "disk_friction", "pusher_friction")
+_QUANTITIES = {
+    "mass": MASS,
+    "radius": RADIUS,
+    "table_friction": FRICTION,
+    "disk_friction": FRICTION,
+    "pusher_friction": FRICTION,
+    "pusher_radius": PUSHER_RADIUS,
+}
 
 
 def check_scene(scene: Scene, source: str = "scene") -> None:
-    """Raise `BadScene` unless every property is finite and of the right sign.
+    """Raise `BadScene` unless every property is in its range.
 
     Args:
         scene: any batch shape, not traced.
-        source: name for the message, for example a file.
+        source: named in the message, a file for example.
 
     Raises:
-        BadScene: with the source, the field, the value and what it must be.
+        BadScene: with the source, the field, the value and its range.
     """
-    for name in _POSITIVE + _NOT_NEGATIVE:
-        values = np.asarray(getattr(scene, name))
-        low = values > 0 if name in _POSITIVE else values >= 0
-        good = np.isfinite(values) & low
-        if not good.all():
-            wanted = "positive" if name in _POSITIVE else "zero or positive"
-            value = values[~good].flat[0]
-            raise BadScene(f"{source}: {name} is {value}; it must be {wanted}.")
+    for name, quantity in _QUANTITIES.items():
+        where = f"{source}: {name}"
+        quantity.check(getattr(scene, name), where, error=BadScene)
+    TIME_STEP_RANGE.check(scene.time_step, f"{source}: time_step", error=BadScene)

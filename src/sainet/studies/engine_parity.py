@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import msgspec
 import numpy as np
 
-from sainet.datasets.config import GenerateConfig, Setup
+from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
@@ -25,9 +25,10 @@ from sainet.scenes.state import State, Trajectory
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.result import Result
+from sainet.worlds.config import SetupName
 
 PUSHES = 200
-_SETUPS: tuple[Setup, ...] = ("robot", "direct-force")
+_SETUPS: tuple[SetupName, ...] = ("robot", "direct-force")
 # Of a uniform pressure: the ratio for pure rotation, and for rotation while sliding
 # (the root of <r^2> / 2), where the ellipsoid of the planar engine resists too much.
 _RATIOS = (2 / 3, 0.5)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from sainet.datasets.bystander import add_bystander
-from sainet.datasets.config import GenerateConfig, Setup
+from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.evaluation.conditions import Condition
 from sainet.evaluation.measurements import Measurements
@@ -17,6 +17,7 @@ from sainet.learning.recipes import FINE_TUNING, PAPER, FromModel, Recipe
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.trainings import Training, scaled
+from sainet.worlds.config import SetupName
 
 AROUND = {
     "sain-bullet": "bullet",
@@ -45,7 +46,7 @@ SIZES = {"quick": Sizes(500, 100, 300), "paper": Sizes(4500, 500, 10_000)}
 class PaperSetup:
     """One of the paper's setups at one scale."""
 
-    setup: Setup
+    setup: SetupName
     scale: Scale
     chain: Chain  # of the shared folder
 
@@ -155,7 +156,7 @@ def with_form(name: str, form: str) -> str:
     return "-".join(part for part in (name, form) if part)
 
 
-def paper_setup(setup: Setup, scale: Scale, chain: Chain) -> PaperSetup:
+def paper_setup(setup: SetupName, scale: Scale, chain: Chain) -> PaperSetup:
     """Return a setup whose folder lies beside that of the experiment."""
     shared = replace(chain, out=chain.out.parent / f"{setup}-{scale}")
     return PaperSetup(setup, scale, shared)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import msgspec
 
-from sainet.datasets.config import Setup
 from sainet.evaluation.conditions import PublishedValues
 from sainet.evaluation.summary import summarise
 from sainet.studies.chain import Chain
@@ -22,6 +21,7 @@ from sainet.studies.published import (
     ROBOT_TWO_DISKS,
 )
 from sainet.studies.result import Result
+from sainet.worlds.config import SetupName
 
 TRAINED_DISKS = 2
 BESIDE = NETWORKS  # what meets a bystander before it meets three disks
@@ -32,7 +32,7 @@ SEEDS = {"quick": range(1), "paper": range(5)}  # trainings of each network
 class PaperTable:
     """One table of the paper: trained on two disks, tested on so many."""
 
-    setup: Setup
+    setup: SetupName
     disks: int
     published: tuple[PublishedValues, ...]
 

@@ -2,11 +2,16 @@
 
 from dataclasses import dataclass, replace
 
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Bool, Float
 
-from sainet.datasets.config import GenerateConfig, Range, bounds
 from sainet.runs.errors import BadInput
+from sainet.scenes.pushes import Push, place_pusher
+from sainet.scenes.scene import Scene
+from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.state import State, at_rest
+from sainet.worlds.config import Range, WorldConfig, bounds
 
 _ARRANGEMENTS = 200  # of all disks of a scene
 _TRIES = 50  # for each disk of an arrangement
@@ -15,7 +20,7 @@ _CHUNK_STREAM = 0x5A1  # keeps these draws apart from other uses of the same see
 
 @dataclass(frozen=True)
 class Draws:
-    """The scenes and pushes of one chunk, in NumPy, before anything is simulated."""
+    """Random scenes and pushes in double precision."""
 
     mass: Float[np.ndarray, "push body"]  # kg
     radius: Float[np.ndarray, "push body"]  # m
@@ -26,18 +31,49 @@ class Draws:
     direction: Float[np.ndarray, " push"]  # rad
     stroke: Float[np.ndarray, " push"]  # m
     speed: Float[np.ndarray, " push"]  # m/s
+    pusher_radius: float  # m
+
+    def scene(self) -> Scene:
+        """Return the scenes."""
+        contact = _single(self.contact_friction)
+        return Scene(
+            mass=_single(self.mass),
+            radius=_single(self.radius),
+            table_friction=_single(self.table_friction),
+            disk_friction=contact,
+            pusher_friction=contact,
+            pusher_radius=jnp.full_like(contact, self.pusher_radius),
+        )
+
+    def state(self) -> State:
+        """Return the disks at rest; the pusher is not placed."""
+        position = _single(self.position)
+        return at_rest(position, jnp.zeros(position.shape[:2]), position[:, 0])
+
+    def push(self) -> Push:
+        """Return the pushes."""
+        return Push(
+            contact_angle=_single(self.contact_angle),
+            direction=_single(self.direction),
+            length=_single(self.stroke),
+            speed=_single(self.speed),
+        )
+
+
+def _single(values: np.ndarray) -> Array:
+    return jnp.asarray(values, jnp.float32)
 
 
 def chunk_generator(seed: int, index: int) -> np.random.Generator:
-    """Return the generator of one chunk: its own, whichever worker draws from it."""
+    """Return the random generator of one chunk, the same in every process."""
     return np.random.default_rng([_CHUNK_STREAM, seed, index])
 
 
-def draw(config: GenerateConfig, rng: np.random.Generator, pushes: int) -> Draws:
+def draw(config: WorldConfig, rng: np.random.Generator, pushes: int) -> Draws:
     """Draw scenes and pushes.
 
     Raises:
-        BadInput: no room was found for a disk, or for the pusher, beside the others.
+        BadInput: a disk or the pusher could not be placed without overlap.
     """
     radius = _uniform(rng, config.radius_mm, (pushes, config.disks)) / 1000
     contact = np.deg2rad(config.contact_angle_deg)
@@ -52,6 +88,7 @@ def draw(config: GenerateConfig, rng: np.random.Generator, pushes: int) -> Draws
         direction=rng.uniform(-heading, heading, pushes),
         stroke=_uniform(rng, config.stroke_mm, (pushes,)) / 1000,
         speed=_uniform(rng, config.speed_mm_s, (pushes,)) / 1000,
+        pusher_radius=config.pusher_radius_mm / 1000,
     )
     return _with_free_pusher(config, rng, draws)
 
@@ -63,13 +100,13 @@ def _uniform(
 
 
 def _place(
-    config: GenerateConfig, rng: np.random.Generator, radius: Float[np.ndarray, " body"]
+    config: WorldConfig, rng: np.random.Generator, radius: Float[np.ndarray, " body"]
 ) -> Float[np.ndarray, "body 2"]:
-    """Put disk 1 at the origin and every other in front of one that is there.
+    """Place disk 1 at the origin and every other disk in front of an earlier disk.
 
-    Disks 2 and 3 touch disk 1, as in the paper; it has no room for more, so that each
-    further one touches any of the disks before it. Where the disks that are there
-    leave no room for the next (disk 2 right in the middle, say), all start again.
+    Disks 2 and 3 touch disk 1, as in the paper. Disk 1 has no room for more, so each
+    further disk touches any earlier disk. If the placed disks leave no room for the
+    next, the arrangement starts again.
     """
     for _ in range(_ARRANGEMENTS):
         placed = [np.zeros(2)]
@@ -87,18 +124,18 @@ def _place(
 
 
 def _with_free_pusher(
-    config: GenerateConfig, rng: np.random.Generator, draws: Draws
+    config: WorldConfig, rng: np.random.Generator, draws: Draws
 ) -> Draws:
-    """Place disks and pusher again where the pusher would start inside a disk.
+    """Draw disks and pusher again where the pusher would start inside a disk.
 
-    The pushed disk is where the pusher starts; from three disks on another may be.
+    Only from three disks on can another disk than the pushed disk be in its way.
     """
     position, contact_angle = draws.position.copy(), draws.contact_angle.copy()
-    # A generator of their own: what is drawn again changes no other push.
+    # A generator of their own: redrawn pushes leave all others unchanged.
     (again,) = rng.spawn(1)
     for _ in range(_ARRANGEMENTS):
         draws = replace(draws, position=position, contact_angle=contact_angle)
-        inside = np.flatnonzero((_pusher_gaps(config, draws)[:, 1:] < 0).any(axis=1))
+        inside = np.flatnonzero(_pusher_overlaps(draws, config.gap_mm / 1000))
         if not len(inside):
             return draws
         widest = np.deg2rad(config.contact_angle_deg)
@@ -111,26 +148,21 @@ def _with_free_pusher(
     )
 
 
-def _pusher_gaps(
-    config: GenerateConfig, draws: Draws
-) -> Float[np.ndarray, "push body"]:
-    """Return the gaps between pusher and disks at the start (m); negative: overlap."""
-    pushed, radius = draws.position[:, 0], config.pusher_radius_mm / 1000
-    ahead = draws.position[:, min(1, config.disks - 1)] - pushed
-    angle = np.arctan2(ahead[:, 1], ahead[:, 0]) + draws.contact_angle
-    reach = draws.radius[:, :1] + radius + config.gap_mm / 1000
-    pusher = pushed - reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    apart = np.linalg.norm(draws.position - pusher[:, None], axis=-1)
-    return apart - draws.radius - radius
+def _pusher_overlaps(draws: Draws, gap: float) -> Bool[np.ndarray, " push"]:
+    """Return whether the pusher starts inside another disk than the pushed disk."""
+    scene, state = draws.scene(), draws.state()
+    start = place_pusher(scene, state, draws.push(), gap=gap)
+    gaps = pusher_gaps(scene, at_rest(state.position, state.angle, start))
+    return np.any(np.asarray(gaps)[:, 1:] < 0, axis=1)
 
 
 def _find_room(
-    config: GenerateConfig,
+    config: WorldConfig,
     rng: np.random.Generator,
     placed: list[np.ndarray],
     radius: Float[np.ndarray, " body"],
 ) -> Float[np.ndarray, " 2"] | None:
-    """Return where the next disk may go, None when no try found room."""
+    """Return a place for the next disk, None if no try found room."""
     body = len(placed)
     for _ in range(_TRIES):
         parent = 0 if body < 3 else int(rng.integers(body))  # noqa: PLR2004

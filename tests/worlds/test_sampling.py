@@ -5,13 +5,14 @@ import pytest
 
 from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.sampling import chunk_generator, draw
 from sainet.runs.errors import BadInput
 from sainet.scenes.shapes import pusher_gaps
+from sainet.worlds.config import WorldConfig
+from sainet.worlds.sampling import chunk_generator, draw
 
 
 def drawn(pushes=400, **settings):
-    return draw(GenerateConfig(**settings), chunk_generator(3, 0), pushes)
+    return draw(WorldConfig(**settings), chunk_generator(3, 0), pushes)
 
 
 def assert_uniform(values, low, high):
@@ -81,7 +82,7 @@ def test_disks_without_room_are_refused():
 
 def test_a_pusher_without_room_is_refused(monkeypatch):
     inside = np.full((1, 3), -1e-3)
-    monkeypatch.setattr("sainet.datasets.sampling._pusher_gaps", lambda *_: inside)
+    monkeypatch.setattr("sainet.worlds.sampling.pusher_gaps", lambda *_: inside)
     with pytest.raises(BadInput, match="`disks` is 3: the pusher could not be placed"):
         drawn(disks=3, pushes=1)
 

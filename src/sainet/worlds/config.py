@@ -1,0 +1,117 @@
+"""Settings of simulated scenes and pushes, free of JAX."""
+
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from sainet.runs.errors import require, require_one_of
+from sainet.scenes.quantities import (
+    FRICTION,
+    GAP,
+    MASS,
+    MOST_DISKS,
+    MOST_STEPS,
+    PUSHER_RADIUS,
+    PUSHING_FORCE,
+    RADIUS,
+    SPEED,
+    STROKE,
+    Quantity,
+    require_count,
+)
+from sainet.worlds.noise_config import NoiseConfig, NoiseLevel
+
+SetupName = Literal["robot", "direct-force"]
+Range = tuple[float] | tuple[float, float]
+_RIGHT_ANGLE = 90  # degrees
+
+_COUNTS = {
+    "disks": (1, MOST_DISKS),
+    "force_steps": (1, MOST_STEPS),
+    "hold_steps": (0, MOST_STEPS),
+}
+_RANGES = {
+    "mass_kg": MASS,
+    "radius_mm": RADIUS.times(1000, "mm"),
+    "stroke_mm": STROKE.times(1000, "mm"),
+    "speed_mm_s": SPEED.times(1000, "mm/s"),
+    "table_friction": FRICTION,
+    "contact_friction": FRICTION,
+}
+_QUANTITIES = {
+    "pusher_radius_mm": PUSHER_RADIUS.times(1000, "mm"),
+    "force_n": PUSHING_FORCE,
+    "gap_mm": GAP.times(1000, "mm"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldConfig:
+    """Distributions of random scenes and pushes (the paper's, section IV-B).
+
+    A range is a uniform distribution between two numbers, or one constant.
+    """
+
+    disks: int = 2
+    """Number of disks."""
+    mass_kg: Range = (0.85, 1.15)
+    """Mass of a disk (kg, range)."""
+    radius_mm: Range = (50.0, 60.0)
+    """Radius of a disk (mm, range)."""
+    table_friction: Range = (0.05, 0.25)
+    """Friction coefficient between disks and table (range, one value per push)."""
+    contact_friction: Range = (0.25,)
+    """Friction coefficient between disks, and between disk and pusher (range)."""
+    pusher_radius_mm: float = 4.8
+    """Radius of the pusher (mm)."""
+    contact_angle_deg: float = 60.0
+    """Largest contact angle, from the back of disk 1 to either side (degrees)."""
+    direction_deg: float = 30.0
+    """Largest push direction, relative to the contact normal (degrees)."""
+    placement_deg: float = 60.0
+    """Largest angle between the line of two neighbouring disks and the push frame's x
+    axis (degrees)."""
+    gap_mm: float = 0.0
+    """Initial gap between neighbouring disks, and between disk 1 and pusher (mm)."""
+    stroke_mm: Range = (10.0,)
+    """Stroke of a push (mm, range; robot)."""
+    speed_mm_s: Range = (50.0,)
+    """Speed of a push (mm/s, range; robot)."""
+    hold_steps: int = 152
+    """Number of steps after the stroke (robot). The total, 48 + 152 = 200 with the
+    defaults, is rounded up to a multiple of 40."""
+    force_n: float = 8.0
+    """Force on the pusher (N; direct force)."""
+    force_steps: int = 480
+    """Number of steps with force (direct force), 1/240 s each."""
+    noise_level: NoiseLevel = "default"
+    """Scale of all noise; paper-like is three times the default."""
+    noise: NoiseConfig = field(default_factory=NoiseConfig)
+    """The sources of noise."""
+
+    def __post_init__(self) -> None:
+        """Check every setting.
+
+        Raises:
+            BadSetting: a value is out of its range.
+        """
+        require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
+        for name, (low, high) in _COUNTS.items():
+            require_count(name, getattr(self, name), low=low, high=high)
+        for name, quantity in _RANGES.items():
+            _check_range(name, getattr(self, name), quantity)
+        for name, quantity in _QUANTITIES.items():
+            quantity.require(name, getattr(self, name))
+        for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
+            value = getattr(self, name)
+            require(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
+
+
+def bounds(values: Range) -> tuple[float, float]:
+    """Return the low and the high end of a range of one or two numbers."""
+    return values[0], values[-1]
+
+
+def _check_range(name: str, values: Range, quantity: Quantity) -> None:
+    require(len(values) in (1, 2), name, "one number or two", values)
+    quantity.require(name, values)
+    require(values[0] <= values[-1], name, "a range, low before high", values)
