@@ -35,7 +35,7 @@ class Ahead(AbstractPlanner):
         if not np.isfinite(state.position).all():
             raise BadScene("observation: position holds NaN")
         push = jax.tree.map(lambda x: x[0], self.actions.pushes())
-        return Plan((push,), np.zeros((1, 2, 3)), 0.0, 0.0, 1)
+        return Plan((push,), lambda: np.zeros((1, 2, 3)), 0.0, 0.0, 1)
 
 
 def recorded(push: Push, value: float = 0.0, trouble: str = "") -> Recording:

@@ -1,7 +1,9 @@
 """Plans, and the interface of planners."""
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 
 import equinox as eqx
 import jax
@@ -23,12 +25,17 @@ class Plan:
     """The pushes selected by a planner, in order of execution."""
 
     pushes: tuple[Push, ...]
-    path: Float[np.ndarray, "time body 3"]  # predicted poses over all pushes
+    predict: Callable[[], Float[np.ndarray, "time body 3"]] = field(repr=False)
     cost: float  # at the end of the path
     distance: float  # at the end of the path, m
     looked_at: int  # number of predicted pushes
     is_complete: bool = True  # False: a deadline or limit ended the search early
     warnings: tuple[str, ...] = ()  # why the prediction may be inaccurate
+
+    @cached_property
+    def path(self) -> Float[np.ndarray, "time body 3"]:
+        """The predicted poses over all pushes, computed when first read."""
+        return self.predict()
 
 
 class AbstractPlanner(eqx.Module):
@@ -64,10 +71,9 @@ class AbstractPlanner(eqx.Module):
         found = self.search(dynamics, task, scene, state)
         grid = jax.device_get(self.actions.pushes())
         pushes = tuple(jax.tree.map(lambda x, i=i: x[i], grid) for i in found.actions)
-        path = predicted_path(dynamics, scene, state, pushes)
         return Plan(
             pushes=pushes,
-            path=path,
+            predict=partial(predicted_path, dynamics, scene, state, pushes),
             cost=found.cost,
             distance=found.distance,
             looked_at=found.looked_at,
