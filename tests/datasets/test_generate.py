@@ -12,6 +12,8 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from importlib.util import find_spec
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -20,6 +22,8 @@ from sainet.datasets import writer
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
+from sainet.engines.planar.engine import PlanarEngine
+from sainet.runs.documents import write_document
 from sainet.runs.errors import BadInput, Diverged, MissingExtra, RunConflict
 from support import require
 
@@ -137,7 +141,7 @@ def test_a_damaged_chunk_is_made_again(whole_store, tmp_path):
     for index in range(info.chunks):
         receipt = {name: hashes[name] for name in writer.chunk_files(info, index)}
         path = out / writer.PROGRESS / f"chunk-{index:06d}.json"
-        path.write_text(json.dumps(receipt))
+        write_document(path, writer.Listing(files=receipt))
     (out / writer.ARRAYS / "truth" / "c" / "2" / "0" / "0" / "0").write_bytes(b"x")
     (out / writer.ARRAYS / "truth" / "c" / "1" / "0" / "0" / "0").unlink()
     (out / writer.ARRAYS / "truth" / "c" / "3.0.partial").write_bytes(b"x")
@@ -158,7 +162,7 @@ def test_progress_adds_up(tmp_path):
 @pytest.mark.slow
 def test_disks_without_room_leave_nothing_behind(tmp_path):
     config = GenerateConfig(disks=3, placement_deg=1.0, pushes=4, chunk_size=4)
-    with pytest.raises(BadInput, match="no room"):
+    with pytest.raises(BadInput, match="could not be placed"):
         generate(config, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -166,7 +170,7 @@ def test_disks_without_room_leave_nothing_behind(tmp_path):
 def test_no_room_in_a_later_chunk_is_found_before_any_work(tmp_path):
     """Eight chunks, of which only the sixth cannot be drawn."""
     config = GenerateConfig(disks=3, placement_deg=32.3, pushes=40, chunk_size=5)
-    with pytest.raises(BadInput, match="no room"):
+    with pytest.raises(BadInput, match="could not be placed"):
         generate(config, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -181,10 +185,18 @@ def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_truth_of_nan_is_refused(tmp_path):
-    light = small(mass_kg=(1e-42,), pushes=7, noise_level="none")
+class LostEngine(PlanarEngine):
+    """Predicts NaN."""
+
+    def rollout(self, scene, initial, controls):
+        found = super().rollout(scene, initial, controls)
+        return jax.tree.map(lambda x: x * jnp.nan, found)
+
+
+def test_a_truth_of_nan_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("sainet.datasets.simulate.make_engine", lambda _: LostEngine())
     with pytest.raises(Diverged, match="push 0 of the dataset: engine planar gave"):
-        generate(light, tmp_path / "store")
+        generate(small(pushes=7, noise_level="none"), tmp_path / "store")
 
 
 def test_a_missing_engine_leaves_nothing_behind(tmp_path, monkeypatch):
