@@ -48,6 +48,10 @@ own = Model(ModelId(kind="physics", name="carried"), Carried())
 with TemporaryDirectory() as folder:
     settings = GenerateConfig(pushes=20, chunk_size=20, seed=1)
     pushes = generate(settings, Path(folder) / "pushes")
-    table = evaluate([own, load_model("sain")], pushes).to_dict()
-for row in table["rows"]:
-    print(f"{row['model']}, disk {row['body']}: {row['pos_mm']:.2f} mm")
+    measured = evaluate([own, load_model("sain")], pushes)
+for model in measured.slugs:
+    error = measured.values("pos_mm", model).mean(axis=0)  # [push, body]
+    print(
+        f"{model}: "
+        + ", ".join(f"disk {i}: {e:.2f} mm" for i, e in enumerate(error, 1))
+    )

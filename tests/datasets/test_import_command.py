@@ -112,7 +112,7 @@ def test_a_push_that_an_engine_cannot_follow_is_named(
     out = tmp_path / "out"
     assert run([*words, "--out", str(out)]) == 1
     error = capfd.readouterr().err
-    assert error.startswith(f"sainet: {table}: push 'a-7': the engine planar")
+    assert error.startswith(f"sainet: {table}: push 'a-7': engine planar")
     assert len(error.splitlines()) == 1
     with pytest.raises(BadStore):
         open_store(out)

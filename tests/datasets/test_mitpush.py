@@ -268,7 +268,7 @@ def test_equal_input_gives_equal_bytes(small: Path, tmp_path: Path):
 def test_foreign_folders_stay_unchanged(small: Path, tmp_path: Path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "letter.txt").write_text("dear")
-    with pytest.raises(RunConflict, match="is not empty"):
+    with pytest.raises(RunConflict, match="not a sainet run folder"):
         import_endpoints(small, tmp_path / "out")
     assert tree(tmp_path / "out") == {"letter.txt": b"dear"}
     with pytest.raises(RunConflict, match="is a file"):

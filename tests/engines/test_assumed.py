@@ -70,5 +70,7 @@ def test_rolls_out_in_the_assumed_scene():
 
 
 def test_an_unknown_engine_lists_the_available_engines():
-    with pytest.raises(UnknownName, match="'plannar'. Available: .*planar"):
+    with pytest.raises(
+        UnknownName, match="'plannar' .did you mean planar.*Available: .*planar"
+    ):
         make_engine("plannar")

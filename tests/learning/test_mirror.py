@@ -71,7 +71,7 @@ def test_forces_and_contact_offsets_are_mirrored():
 
 
 def test_each_iteration_mirrors_half_of_the_pushes(tmp_path):
-    info = info_of(200)
+    info = info_of(90)
     store = write(tmp_path / "data", info, made_up(info))
     arrays = store.read(slice(None))
     recipe = PAPER.changed(mirror=True)

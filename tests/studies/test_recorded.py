@@ -66,7 +66,7 @@ def make(chain, recorded, monkeypatch, tmp_path):
     whole = replace(chain, recorded=recorded.path)
     return lambda name: load_experiment(name)(
         "quick", replace(whole, out=tmp_path / name)
-    )
+    ).to_json()
 
 
 def test_surfaces_are_groups_without_their_speed(recorded):

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-import msgspec
 import numpy as np
 from jaxtyping import Int
 
@@ -23,7 +22,7 @@ from sainet.models.camera import with_camera
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.identified import read_identified
-from sainet.models.identity import ModelId
+from sainet.models.identity import identity_named
 from sainet.models.library import load_model, network_folder
 from sainet.models.model import Model
 from sainet.studies.chain import Chain
@@ -83,13 +82,13 @@ class Tuner:
         identified = load_model(str(self._identified()))
         return [
             load_model("physics"),
-            replace(identified, id=msgspec.structs.replace(identified.id, name="")),
+            replace(identified, id=identity_named("physics-identified")),
         ]
 
     def models(self, variants: Sequence[Variant]) -> list[Model]:
         """Return networks, trained where they are to be."""
         return [
-            replace(self._model(each), id=ModelId(kind=each.network, name=each.name))
+            replace(self._model(each), id=identity_named(each.name))
             for each in variants
         ]
 

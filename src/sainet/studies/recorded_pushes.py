@@ -21,6 +21,7 @@ from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.offsets import EndOffsets, end_offsets
 from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import Features, ModelKind
+from sainet.models.identity import identity_named
 from sainet.report.figures.engine_errors import draw_engine_errors
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
@@ -114,7 +115,8 @@ def _for_all(fold: Fold, scale: Scale, chain: Chain) -> Measurements:
     """Return the errors of models that were made for all surfaces at once."""
     tuner = Tuner(fold.training, f"every-surface/fold-{fold.number}", scale, chain)
     models = [
-        replace(model, name=f"{model.name}-for-all") for model in tuner.models(FOR_ALL)
+        replace(model, id=identity_named(f"{model.name}-for-all"))
+        for model in tuner.models(FOR_ALL)
     ]
     return chain.compare(models, fold.tests)
 
