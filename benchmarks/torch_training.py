@@ -168,7 +168,6 @@ def main() -> None:
     losses, times = train(arrays, 1 + iterations)
     result = {
         "iteration_ms": 1000 * median(times[1:]),
-        "loss": losses[0],
         "losses": losses,
         "threads": torch.get_num_threads(),
         "torch": torch.__version__,

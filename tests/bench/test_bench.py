@@ -17,7 +17,13 @@ from jax.extend.core import ClosedJaxpr, Jaxpr
 from sainet.bench import CASES, load_case
 from sainet.bench import training as training_case
 from sainet.bench.ceiling import ceiling_gflops
-from sainet.bench.peer import TorchPeer, missing_torch, run_torch, save_problem
+from sainet.bench.peer import (
+    TorchPeer,
+    TorchRun,
+    missing_torch,
+    run_torch,
+    save_problem,
+)
 from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import median_seconds
 from sainet.bench.training import TrainingLoop, counted_gflop
@@ -260,10 +266,10 @@ needs_torch = pytest.mark.skipif(
 def test_torch_computes_the_same_losses_and_steps(trained: Trained, tmp_path: Path):
     path = save_problem(tmp_path / "problem.npz", trained.problem)
     result = run_torch(path, 2)
-    assert result["loss"] == pytest.approx(trained.losses[0], rel=1e-5)
     # The later ones hold the gradient, its clipping and Adam against each other.
-    assert result["losses"] == pytest.approx(trained.losses, rel=3e-5)
-    assert result["iteration_ms"] > 0
+    assert result.losses[0] == pytest.approx(trained.losses[0], rel=1e-5)
+    assert list(result.losses) == pytest.approx(trained.losses, rel=3e-5)
+    assert result.iteration_ms > 0
 
 
 @needs_torch
@@ -274,14 +280,14 @@ def test_a_failing_peer_reports_its_error(tmp_path: Path):
 
 @pytest.mark.parametrize("loss", [1.01, 0.99, math.nan])
 def test_a_peer_with_another_first_loss_is_refused(loss, monkeypatch):
-    result = {"loss": loss, "iteration_ms": 7.0}
+    result = TorchRun((loss,), iteration_ms=7.0)
     monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
     with pytest.raises(SainetError, match="same work"):
         TorchPeer(Path("problem.npz"), 1.0).iteration_ms()
 
 
 def test_a_peer_may_differ_by_rounding(monkeypatch):
-    result = {"loss": 1.0005, "iteration_ms": 7.0}
+    result = TorchRun((1.0005,), iteration_ms=7.0)
     monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
     assert TorchPeer(Path("problem.npz"), 1.0).iteration_ms() == 7.0
 

@@ -4,10 +4,11 @@ Figures compare measurements of the same run, because the speed of shared machin
 drifts; `docs/benchmarks.md` defines each figure.
 """
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
 
 from sainet.runs.names import load_named
+
+Figures = Mapping[str, float | str | None]  # by name; None where not measured
 
 # Functions that take `runs`.
 CASES = {
@@ -17,7 +18,7 @@ CASES = {
 }
 
 
-def load_case(name: str) -> Callable[..., dict[str, Any]]:
+def load_case(name: str) -> Callable[..., Figures]:
     """Return the function of a case; its argument `runs` is the number of measurements.
 
     Raises:

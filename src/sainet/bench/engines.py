@@ -5,10 +5,10 @@ Both simulate the same pushes, in the same run, on all cores.
 
 from importlib.util import find_spec
 from statistics import median
-from typing import Any
 
 import jax
 
+from sainet.bench import Figures
 from sainet.bench.timing import check_runs, median_seconds
 from sainet.datasets.batch import to_controls, to_initial, to_scene
 from sainet.datasets.config import GenerateConfig
@@ -29,9 +29,7 @@ _HOLD_STEPS = 32
 Pushes = tuple[Scene, State, Controls]
 
 
-def bench_engines(
-    runs: int = 5, *, batch: int = BATCH, steps: int = STEPS
-) -> dict[str, Any]:
+def bench_engines(runs: int = 5, *, batch: int = BATCH, steps: int = STEPS) -> Figures:
     """Return the speed of both engines under the planner's load, without compilation.
 
     Args:
@@ -74,9 +72,7 @@ def _count(pushes: Pushes) -> int:
     return pushes[0].batch_shape[0]
 
 
-def _figures(
-    measured: list[tuple[float, float | None]], steps: int
-) -> dict[str, float | None]:
+def _figures(measured: list[tuple[float, float | None]], steps: int) -> Figures:
     """Return the medians; the ratio is the median of the ratios of each measurement."""
     ratios = [planar / bullet for planar, bullet in measured if bullet]
     rates = [bullet for _, bullet in measured if bullet]

@@ -4,12 +4,12 @@ PyTorch is not a dependency of the package: the comparison is in `benchmarks/`, 
 the sources, and `make torch-env` creates its environment.
 """
 
-import json
 import subprocess
 from pathlib import Path
-from typing import Any
 
+import msgspec
 import numpy as np
+from jaxtyping import Array
 
 from sainet.bench.problem import Problem
 from sainet.learning.batch import path_to_frame, to_target
@@ -35,6 +35,13 @@ def missing_torch() -> str | None:
     return None
 
 
+class TorchRun(msgspec.Struct, frozen=True):
+    """Results of the PyTorch script."""
+
+    losses: tuple[float, ...]  # before each step
+    iteration_ms: float  # median
+
+
 class TorchPeer:
     """Training on a saved problem with PyTorch, checked to do the same work."""
 
@@ -50,16 +57,16 @@ class TorchPeer:
             SainetError: the first loss of PyTorch differs from ours.
         """
         result = run_torch(self._problem, iterations)
-        difference = abs(result["loss"] - self._loss)
+        difference = abs(result.losses[0] - self._loss)
         if not difference <= _TOLERANCE * abs(self._loss):
             raise SainetError(
-                f"{_SCRIPT.name}: the first loss is {result['loss']:.6g}, ours is "
+                f"{_SCRIPT.name}: the first loss is {result.losses[0]:.6g}, ours is "
                 f"{self._loss:.6g}; change the script so that both do the same work."
             )
-        return result["iteration_ms"]
+        return result.iteration_ms
 
 
-def run_torch(problem: Path, iterations: int = 5) -> dict[str, Any]:
+def run_torch(problem: Path, iterations: int = 5) -> TorchRun:
     """Return the results of `benchmarks/torch_training.py` on a saved problem.
 
     Raises:
@@ -70,7 +77,7 @@ def run_torch(problem: Path, iterations: int = 5) -> dict[str, Any]:
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise SainetError(f"{_SCRIPT.name} failed ({last}); try `make torch-env`.")
-    return json.loads(done.stdout.strip().splitlines()[-1])
+    return msgspec.json.decode(done.stdout.strip().splitlines()[-1], type=TorchRun)
 
 
 def save_problem(path: Path, problem: Problem) -> Path:
@@ -102,7 +109,7 @@ def save_problem(path: Path, problem: Problem) -> Path:
     return path
 
 
-def _batch_arrays(problem: Problem) -> dict[str, Any]:
+def _batch_arrays(problem: Problem) -> dict[str, Array]:
     size, whole = problem.recipe.optimiser.batch_size, problem.batch
     if whole.simulated is None:
         raise ValueError("a batch for SAIN holds s-bar")

@@ -7,11 +7,11 @@ from importlib.util import find_spec
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 
+from sainet.bench import Figures
 from sainet.bench.timing import check_runs
 from sainet.control.config import ControlConfig
 from sainet.control.trial import Trial, make_trial
@@ -36,7 +36,7 @@ decide({model!r})
 
 def bench_planning(
     runs: int = DECISIONS, *, model: str = "sain", starts: bool = True
-) -> dict[str, Any]:
+) -> Figures:
     """Return decision times of both planners, of Bullet, and of new processes.
 
     Args:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 
+from sainet.bench import Figures
 from sainet.bench.ceiling import ceiling_gflops
 from sainet.bench.peer import TorchPeer, missing_torch, save_problem
 from sainet.bench.problem import Problem, make_problem
@@ -51,7 +52,7 @@ class TrainingLoop:
 
 def bench_training(
     runs: int = 5, *, pushes: int = 100, steps: int = 200, repeats: int = 5
-) -> dict[str, Any]:
+) -> Figures:
     """Return the time of a training iteration of SAIN: gradient and Adam update.
 
     Args:
@@ -117,7 +118,7 @@ def _measure(loop: TrainingLoop, peer: TorchPeer | None, repeats: int) -> Measur
     return measurement
 
 
-def _figures(measured: list[Measurement], work: float) -> dict[str, float | None]:
+def _figures(measured: list[Measurement], work: float) -> Figures:
     fractions = [work / (m.iteration_ms / 1000 * m.ceiling_gflops) for m in measured]
     ratios = [m.torch_ms / m.iteration_ms for m in measured if m.torch_ms is not None]
     return {

@@ -1,12 +1,11 @@
 """`sainet bench`."""
 
 from dataclasses import dataclass, field
-from typing import Any
 
 from tyro.conf import Positional
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +18,7 @@ class Bench:
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Run the cases one after another.
 
         Returns:
@@ -29,15 +28,15 @@ class Bench:
         use_devices(self.devices)
         from rich.text import Text
 
-        from sainet.bench import CASES, load_case
+        from sainet.bench import CASES, Figures, load_case
 
         # Every name is looked up before anything is measured.
         cases = {name: load_case(name) for name in self.cases or tuple(CASES)}
-        figures: dict[str, Any] = {}
+        figures: dict[str, Figures] = {}
         for name, case in cases.items():
             self.output.say(f"Measuring {name} ...")
             figures[name] = case()
             for key, value in figures[name].items():
-                told = Text(f"  {key}: {value}")  # a value may look like markup
-                self.output.console.print(told, soft_wrap=True)
+                line = Text(f"  {key}: {value}")  # a value may look like markup
+                self.output.console.print(line, soft_wrap=True)
         return figures if len(figures) > 1 else next(iter(figures.values()))

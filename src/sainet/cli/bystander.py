@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.progress import progress_bar
 
 
@@ -24,7 +23,7 @@ class AddBystander:
     """Random seed of the masses, radii and places of the bystanders."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Write the dataset."""
         use_devices(None)
         from sainet.datasets.bystander import add_bystander

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Evaluate:
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Evaluate the models and print the table."""
         use_devices(self.devices)
         from sainet.datasets.store import open_store

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.progress import progress_bar
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.workers import worker_pool
@@ -21,7 +20,7 @@ class Generate:
     """Number of processes, which does not affect the result. Default: one per core."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Generate the dataset."""
         from sainet.datasets.generate import generate
 

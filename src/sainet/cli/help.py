@@ -46,17 +46,17 @@ def _settings(info: StructTypeInfo) -> StructConstructorSpec | None:
 def _option(field: Field[Any], kind: Any, text: str, owner: object) -> StructFieldSpec:  # noqa: ANN401
     value = _default(field, owner)
     stated = _DEFAULT.search(text)
-    settings: dict[str, Any] = {}
+    behaviour = metavar = None
     if stated is not None:
-        settings["help_behavior_hint"] = f"(default: {stated['value']})"
+        behaviour = f"(default: {stated['value']})"
     elif value is None or value == () or isinstance(value, bool):
-        settings["help_behavior_hint"] = ""
+        behaviour = ""
     if value is None:
         kind = Annotated[kind, DisallowNone]
     elif type(None) in get_args(kind):
         (other,) = (each for each in get_args(kind) if each is not type(None))
-        settings["metavar"] = f"{other.__name__.upper()}|None"
-    kind = Annotated[kind, arg(**settings)]
+        metavar = f"{other.__name__.upper()}|None"
+    kind = Annotated[kind, arg(metavar=metavar, help_behavior_hint=behaviour)]
     return StructFieldSpec(
         name=field.name,
         type=kind,

@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.progress import progress_bar
 
 
@@ -21,7 +20,7 @@ class Identify:
     """Group of pushes to use, for example abs-10. Default: all."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Identify the parameters and print those that are not identifiable."""
         use_devices(None)
         from sainet.datasets.store import open_store

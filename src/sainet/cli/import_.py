@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from sainet.cli.devices import use_cache
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.runs.errors import BadInput
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Import:
     from a sweep on pushes of the MIT Push dataset."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Import the pushes."""
         use_cache()
         store = self._import()

@@ -2,11 +2,15 @@
 
 import json
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+
+Json = Mapping[str, object]  # the object that a command prints with `json`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +45,7 @@ class Output:
         print(text, file=sys.stderr)
 
 
-def finish(result: dict[str, Any], output: Output) -> None:
+def finish(result: Json, output: Output) -> None:
     """Print the result of a command as JSON if that was asked for."""
     if output.json:
         print(json.dumps(result, allow_nan=False))

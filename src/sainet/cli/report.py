@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from tyro.conf import Positional
 
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,7 +16,7 @@ class MakeReport:
     """Run folder of train, control, identify, demo or one experiment of reproduce."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Write the report, unless the command that made the folder wrote its own."""
         from sainet.report.pages.page import REPORT
         from sainet.runs.documents import write_bytes

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +26,7 @@ class Split:
     """Keep recorded chains together: pushes that start where another push ended."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Write both datasets."""
         from sainet.datasets.splits import write_split
         from sainet.datasets.store import open_store

@@ -2,12 +2,12 @@
 
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from tyro.conf import AvoidSubcommands, Positional
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.progress import progress_bar
 from sainet.learning.recipes import PAPER, ModelKind, Recipe, SingleSteps
 from sainet.runs.errors import BadInput
@@ -44,7 +44,7 @@ class Train:
     """CPU devices to split each batch over (default: one per core)."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Train the network and draw its learning curve.
 
         Raises:
@@ -80,9 +80,7 @@ class Job:
     group: str | None  # None: all
     pushes: int | None  # from the start of the dataset; None: all
 
-    def run(
-        self, recipe: Recipe, devices: int | None, output: Output
-    ) -> dict[str, Any]:
+    def run(self, recipe: Recipe, devices: int | None, output: Output) -> Json:
         """Train the network, with a progress bar, and draw its learning curve.
 
         Returns:

@@ -2,11 +2,10 @@
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 from tyro.conf import Positional
 
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.train import Job
 from sainet.learning.recipes import (
     FROM_ENGINE,
@@ -90,7 +89,7 @@ class Tune:
     """CPU devices to split each batch over (default: one per core)."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Train the network and draw its learning curve."""
         given = {k: v for k, v in asdict(self.changes).items() if v is not None}
         recipe = recipe_for(start_named(self.start)).changed(**given)
