@@ -5,7 +5,9 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Iterator
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -69,27 +71,40 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return next(folder.glob("*.whl"))
 
 
-def pins(folder: Path) -> Path:
+def pins() -> list[str]:
     """Versions of the lock without hashes: a new upstream release cannot fail us."""
     lock = (REPOSITORY / "requirements.lock").read_text()
-    path = folder / "pins.txt"
-    path.write_text("\n".join(re.findall(r"^[\w.-]+==[^\s\\]+", lock, re.MULTILINE)))
-    return path
+    return re.findall(r"^[\w.-]+==[^\s\\]+", lock, re.MULTILINE)
 
 
 def install(python: Path, wheel: Path, folder: Path) -> Path:
     """A fresh environment with the wheel and its base dependencies, no extras."""
-    venv = folder / "venv"
     # This environment's own pip fills it; and no bytecode: compiling half a gigabyte
     # takes longer than unpacking it.
+    venv, constraints = folder / "venv", folder / "pins.txt"
     run_well(python, "-m", "venv", "--without-pip", venv)
-    pip = (sys.executable, "-m", "pip", "--python", venv / "bin" / "python")
+    pip = (sys.executable, "-m", "pip", "--python", venv / "bin" / "python", "install")
     quick = ("--no-compile", "--quiet", "--disable-pip-version-check")
-    done = run(*pip, "install", *quick, "-c", pins(folder), wheel)
+    if python == Path(sys.executable):  # the same packages are here: unpacked already
+        link_base(next(venv.glob("lib/*/site-packages")))
+        run_well(*pip, *quick, "--no-index", wheel)
+        return venv
+    constraints.write_text("\n".join(pins()))
+    done = run(*pip, *quick, "-c", constraints, wheel)
     offline = any(sign in done.stdout + done.stderr for sign in OFFLINE)
     require(done.returncode == 0 or not offline, "no package index can be reached")
     assert done.returncode == 0, done.stdout + done.stderr
     return venv
+
+
+def link_base(packages: Path) -> None:
+    """Links what the lock of the base installation names, and nothing else."""
+    here = Path(sysconfig.get_path("purelib"))
+    for pin in pins():
+        for file in metadata.files(pin.partition("==")[0]) or []:
+            name = file.parts[0]
+            if name != ".." and not (packages / name).exists():
+                (packages / name).symlink_to(here / name)
 
 
 def shipped(package: Path) -> set[str]:
