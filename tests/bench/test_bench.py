@@ -16,7 +16,6 @@ from jax.extend.core import ClosedJaxpr, Jaxpr
 
 from sainet.bench import CASES, load_case
 from sainet.bench import training as training_case
-from sainet.bench.ceiling import ceiling_gflops
 from sainet.bench.peer import (
     TorchPeer,
     TorchRun,
@@ -25,7 +24,7 @@ from sainet.bench.peer import (
     save_problem,
 )
 from sainet.bench.problem import Problem, make_problem
-from sainet.bench.timing import median_seconds
+from sainet.bench.timing import ceiling_gflops, median_seconds
 from sainet.bench.training import TrainingLoop, counted_gflop
 from sainet.cli.bench import Bench
 from sainet.cli.output import Output

@@ -151,7 +151,7 @@ def test_an_unknown_command_is_a_usage_error():
 
 @pytest.mark.parametrize(
     ("command", "told"),
-    [(Generate(out=Path("x")), "goes on from here"), (Bench(), "starts over")],
+    [(Generate(out=Path("x")), "resumes"), (Bench(), "starts over")],
 )
 def test_an_interruption_names_the_command_that_resumes(
     command, told, monkeypatch, capsys

@@ -55,7 +55,7 @@ def test_a_swallowed_interrupt_ends_the_command(
     monkeypatch.setattr(entry, "parse", lambda words: command)
     assert entry.run(["anything"]) == entry.INTERRUPTED
     assert len(done) == steps
-    told = "sainet: interrupted; the same command goes on from here.\n"
+    told = "sainet: interrupted; the same command resumes.\n"
     assert capsys.readouterr().err.endswith(told)
 
 

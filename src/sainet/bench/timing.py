@@ -1,4 +1,4 @@
-"""Time of a call, including the computation of its arrays."""
+"""Timing of calls, and the rate of matrix products of the machine."""
 
 from collections.abc import Callable
 from statistics import median
@@ -6,8 +6,11 @@ from time import perf_counter
 from typing import Any
 
 import jax
+import numpy as np
 
 from sainet.runs.errors import BadSetting
+
+SIZE = 1024
 
 
 def seconds(call: Callable[[], Any]) -> float:
@@ -37,3 +40,18 @@ def check_runs(runs: int) -> None:
     """Raise `BadSetting` if there are no measurements to take the median of."""
     if runs < 1:
         raise BadSetting("runs", runs, "at least 1")
+
+
+def ceiling_gflops(products: int = 5) -> float:
+    """Return the rate of NumPy's float32 1024 x 1024 product on all cores (GFLOP/s).
+
+    A product of n x n matrices counts as ``2 n^3`` operations. The memory of the result
+    is allocated in advance, because allocation is not part of the product.
+
+    Args:
+        products: number of timed products, for the median; one more is the warm-up.
+    """
+    left, right = np.random.default_rng(0).random((2, SIZE, SIZE), dtype=np.float32)
+    result = np.empty_like(left)
+    time = median_seconds(lambda: np.matmul(left, right, out=result), products)
+    return 2 * SIZE**3 / time / 1e9

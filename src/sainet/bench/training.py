@@ -13,10 +13,9 @@ from typing import Any, NamedTuple
 import jax
 
 from sainet.bench import Figures
-from sainet.bench.ceiling import ceiling_gflops
 from sainet.bench.peer import TorchPeer, missing_torch, save_problem
 from sainet.bench.problem import Problem, make_problem
-from sainet.bench.timing import check_runs, median_seconds
+from sainet.bench.timing import ceiling_gflops, check_runs, median_seconds
 from sainet.learning.step import make_step
 from sainet.models.correctors.interaction import InteractionNetwork
 

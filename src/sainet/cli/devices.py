@@ -1,4 +1,4 @@
-"""Set JAX up before the first array is made."""
+"""Settings of JAX that precede its first array."""
 
 import os
 import platform
@@ -13,7 +13,7 @@ _WORTH_KEEPING = "0.5"  # s of compilation
 
 
 def use_devices(count: int | None = None) -> None:
-    """Make JAX see each core as a device of its own; a GPU takes precedence.
+    """Give JAX one CPU device per core; a GPU takes precedence.
 
     Raises:
         BadInput: a count below one.

@@ -57,14 +57,14 @@ Start with 'sainet demo', which runs the whole method at small scale."""
 
 INTERRUPTED = 130
 # Commands that an identical call resumes.
-_GOES_ON = (Demo, Generate, Import, Split, Train, Tune, Control, Reproduce)
+_RESUMABLE = (Demo, Generate, Import, Split, Train, Tune, Control, Reproduce)
 
 
 def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
     """Return the command that these words ask for, not yet run.
 
     Raises:
-        BadInput: a setting that cannot be.
+        BadInput: a setting is out of its range.
         SystemExit: help was asked for (0), or there is no such command or option (2).
     """
     return tyro.cli(
@@ -96,16 +96,15 @@ def run(arguments: Sequence[str] | None = None) -> int:
             print(f"sainet: {message(each, command_type)}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        goes_on = isinstance(command, _GOES_ON)
-        way = "goes on from here" if goes_on else "starts over"
-        print(f"sainet: interrupted; the same command {way}.", file=sys.stderr)
+        verb = "resumes" if isinstance(command, _RESUMABLE) else "starts over"
+        print(f"sainet: interrupted; the same command {verb}.", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         return 0
     except OSError as error:
         if error.filename is None:
             raise
-        # A name that is too long, or a folder that nobody lets us into.
+        # For example a name that is too long, or a folder without permission.
         reason = BadInput(f"{error.filename}: {error.strerror}; give another path.")
         print(f"sainet: {message(reason)}", file=sys.stderr)
         return BadInput.exit_status

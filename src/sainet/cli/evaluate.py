@@ -66,7 +66,7 @@ class Evaluate:
         return to_json_object(summary)
 
     def _fitting(self, store: "Store") -> list[str]:
-        """Return physics and the shipped networks that fit the data; say why not."""
+        """Return physics and the shipped networks that fit; warn of the others."""
         from sainet.models.library import OF_PAPER, OF_STROKES, PHYSICS, load_model
         from sainet.runs.errors import BadCheckpoint, MissingExtra
 

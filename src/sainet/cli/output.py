@@ -1,4 +1,4 @@
-"""What every command prints: text for people, or one JSON object at the end."""
+"""Output of commands: text for people, or one JSON object at the end."""
 
 import json
 import sys
@@ -25,23 +25,23 @@ class Output:
 
     @property
     def console(self) -> "Console":
-        """Where text for people goes."""
+        """The console for text that people read."""
         from rich.console import Console
 
         return Console(stderr=self.json, highlight=False)
 
     def say(self, text: str, *, markup: bool = False) -> None:
-        """Say what is being done, unless quiet.
+        """Print a line about the progress, unless quiet.
 
         Args:
-            text: a line; it is not broken, for it may hold a command to copy.
-            markup: whether brackets are Rich's markup; in a path they are its own.
+            text: a line; it is not wrapped, because it may contain a command to copy.
+            markup: whether brackets are Rich's markup; in a path they are text.
         """
         if not self.quiet:
             self.console.print(text, markup=markup, soft_wrap=True)
 
     def warn(self, text: str) -> None:
-        """Say what the result lacks, quiet or not: it is no progress."""
+        """Print a warning, even when quiet."""
         print(text, file=sys.stderr)
 
 
