@@ -6,11 +6,7 @@ from scipy.stats import t as student_t
 
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.conditions import Condition, Header
-from sainet.evaluation.intervals import (
-    difference_interval,
-    mean_interval,
-    ratio_interval,
-)
+from sainet.evaluation.intervals import Sample
 from sainet.evaluation.joining import pool_trainings
 from sainet.evaluation.measurements import measurements_of
 from sainet.evaluation.metrics import (
@@ -180,7 +176,7 @@ def test_rows_of_one_push_have_no_interval_and_unknown_is_none():
 def test_intervals_cover_the_mean_about_95_times_in_100():
     rng = np.random.default_rng(1)
     values = rng.normal(3, 2, (80, 300))  # 300 experiments of 80 pushes
-    mean, low, high = mean_interval(values)
+    mean, low, high = Sample(values).interval
     np.testing.assert_allclose(mean, values.mean(0))
     covered = ((low < 3) & (high > 3)).mean()
     assert 0.9 < covered < 0.98
@@ -192,15 +188,17 @@ def test_intervals_cover_the_mean_about_95_times_in_100():
 
 def test_intervals_are_the_same_every_time():
     values = np.random.default_rng(2).normal(size=(20, 3))
-    for one, other in zip(mean_interval(values), mean_interval(values), strict=True):
+    for one, other in zip(
+        Sample(values).interval, Sample(values).interval, strict=True
+    ):
         np.testing.assert_array_equal(one, other)
 
 
 def test_unknown_values_have_no_interval():
     values = np.random.default_rng(2).normal(size=(20, 3))
-    whole = mean_interval(values)
+    whole = Sample(values).interval
     values[4, 1] = np.nan
-    for one, other in zip(mean_interval(values), whole, strict=True):
+    for one, other in zip(Sample(values).interval, whole, strict=True):
         assert np.isnan(one[1])
         np.testing.assert_array_equal(one[[0, 2]], other[[0, 2]])
 
@@ -208,9 +206,9 @@ def test_unknown_values_have_no_interval():
 def test_a_ratio_is_that_of_the_means_of_the_same_pushes():
     rng = np.random.default_rng(3)
     below = rng.uniform(1, 9, (60, 1))
-    found = ratio_interval(0.3 * below, below)
+    found = Sample(0.3 * below).over(Sample(below))
     np.testing.assert_allclose(found, 0.3)  # pairs stay together, so it never varies
-    ratio, low, high = ratio_interval(rng.uniform(1, 2, (60, 1)), below)
+    ratio, low, high = Sample(rng.uniform(1, 2, (60, 1))).over(Sample(below))
     assert low < ratio < high
 
 
@@ -218,7 +216,7 @@ def test_differences_are_paired():
     rng = np.random.default_rng(4)
     hard = rng.uniform(0, 100, (40, 1))  # some pushes are hard for every model
     better = hard - 1 + rng.normal(0, 0.1, hard.shape)
-    difference, low, high = difference_interval(better, hard)
+    difference, low, high = Sample(better).minus(Sample(hard))
     assert difference[0] == pytest.approx(-1, abs=0.1)
     assert -1.2 < low[0] < high[0] < -0.8
 
@@ -227,15 +225,15 @@ def test_trainings_count_as_in_the_t_interval():
     rng = np.random.default_rng(6)
     pushes = rng.normal(3, 1, (1, 200, 1))
     luck = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])[:, None, None]
-    mean, low, high = mean_interval(pushes + luck)
-    _, low_one, high_one = mean_interval(pushes)
+    mean, low, high = Sample(pushes + luck).interval
+    _, low_one, high_one = Sample(pushes).interval
     assert mean == pytest.approx(pushes.mean())
     # The t interval of 5 (SciPy's), hardly widened by 1 over the root of 200 pushes.
     _, wanted = student_t.interval(0.95, 4, 0, 0.7906 / np.sqrt(5))
     assert high[0] - low[0] == pytest.approx(2 * wanted, rel=0.1)
     assert high[0] - low[0] > 3 * (high_one[0] - low_one[0])
     # Trainings of two models are drawn apart: alike luck is no pair.
-    _, low, high = difference_interval(pushes + luck, pushes + luck + 0.1)
+    _, low, high = Sample(pushes + luck).minus(Sample(pushes + luck + 0.1))
     assert low[0] < -0.5 < 0.3 < high[0]
 
 
@@ -247,7 +245,7 @@ def test_intervals_of_few_trainings_cover_about_95_times_in_100(trainings):
         luck = rng.normal(0, 1, (2, trainings, 1, 1))
         one, other = luck + rng.normal(0, 1, (1, 40, 1))
         for which, (_, low, high) in enumerate(
-            (mean_interval(one), difference_interval(one, other))
+            (Sample(one).interval, Sample(one).minus(Sample(other)))
         ):
             held[which].append(bool(low[0] <= 0 <= high[0]))
     of_mean, of_difference = map(np.mean, held)

@@ -9,7 +9,8 @@ many. Of a cross-validation folds are resampled, then the pushes in each: pushes
 fold were predicted by the same network.
 """
 
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float
@@ -17,71 +18,76 @@ from jaxtyping import Float
 RESAMPLES = 2000
 _SEED = 0
 _ENDS = (2.5, 97.5)  # percentiles
+_FLOOR = 1e-12  # of a denominator
 
 Values = Float[np.ndarray, "... push quantity"]  # maybe an axis of trainings first
 Folds = tuple[int, ...]  # of each push
 Interval = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, low, high
 
 
-def mean_interval(values: Values, folds: Folds | None = None) -> Interval:
-    """Return the means over pushes (and trainings) and the ends of their intervals."""
-    return _interval(_mean(values), _resampled(values, folds))
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Values of some pushes, and their means over resamples, which are drawn once.
 
-
-def ratio_interval(
-    above: Values, below: Values, folds: Folds | None = None
-) -> Interval:
-    """Return the ratio of two means over the same pushes, with its interval."""
-
-    def ratio(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return x / np.maximum(y, 1e-12)
-
-    drawn = ratio(_resampled(above, folds), _resampled(below, folds))
-    return _interval(ratio(_mean(above), _mean(below)), drawn)
-
-
-def factor_interval(
-    above: Values, below: Values, folds: Folds | None = None
-) -> Interval:
-    """Return the ratio of the means of two models, trained apart, with its interval."""
-    floor = 1e-12
-    drawn = _resampled(above, folds) / np.maximum(_resampled(below, folds, 1), floor)
-    return _interval(_mean(above) / np.maximum(_mean(below), floor), drawn)
-
-
-def difference_interval(
-    one: Values, other: Values, folds: Folds | None = None
-) -> Interval:
-    """Return the difference of two means over the same pushes, with its interval."""
-    drawn = _resampled(one, folds) - _resampled(other, folds, which=1)
-    return _interval(_mean(one) - _mean(other), drawn)
-
-
-def _mean(values: Values) -> np.ndarray:
-    return values.mean(axis=tuple(range(values.ndim - 1)))
-
-
-def _resampled(
-    values: Values, folds: Folds | None, which: int = 0
-) -> Float[np.ndarray, "sample quantity"]:
-    """Return the mean of each resample: of the same pushes for every set of values.
-
-    Args:
-        values: to be resampled.
-        folds: of a cross-validation.
-        which: of two sets of trainings, whose luck is drawn apart.
+    Attributes:
+        values: one for each push and quantity, maybe with an axis of trainings first.
+        folds: of each push, in a cross-validation.
     """
-    whole = values.reshape(-1, *values.shape[-2:])
-    trainings, pushes, quantities = whole.shape
-    if pushes < 2:  # noqa: PLR2004  (one push tells nothing of others)
-        return np.full((RESAMPLES, quantities), np.nan)
-    shares = _shares(pushes) if folds is None else _shares_of_folds(folds)
-    by_training = np.stack([shares @ one for one in whole])
-    mean = by_training.mean(axis=0)
-    if trainings == 1:
-        return mean
-    standard_error = by_training.std(axis=0, ddof=1) / np.sqrt(trainings)
-    return mean + standard_error * _luck(trainings, which)[:, None]
+
+    values: Values
+    folds: Folds | None = None
+
+    @cached_property
+    def mean(self) -> Float[np.ndarray, " quantity"]:
+        """The means over pushes (and trainings)."""
+        return self.values.mean(axis=tuple(range(self.values.ndim - 1)))
+
+    @cached_property
+    def _by_resample(self) -> tuple[np.ndarray, np.ndarray | None, int]:
+        """The mean of each resample, its standard error over trainings, their number.
+
+        Samples of as many pushes have the same resamples.
+        """
+        whole = self.values.reshape(-1, *self.values.shape[-2:])
+        trainings, pushes, quantities = whole.shape
+        if pushes < 2:  # noqa: PLR2004  (one push says nothing of others)
+            return np.full((RESAMPLES, quantities), np.nan), None, trainings
+        shares = _shares(pushes) if self.folds is None else _shares_of_folds(self.folds)
+        by_training = np.stack([shares @ one for one in whole])
+        mean = by_training.mean(axis=0)
+        if trainings == 1:
+            return mean, None, trainings
+        return mean, by_training.std(axis=0, ddof=1) / np.sqrt(trainings), trainings
+
+    def drawn(self, which: int = 0) -> Float[np.ndarray, "sample quantity"]:
+        """Return the mean of each resample, with the luck of its trainings.
+
+        Args:
+            which: of two sets of trainings, whose luck is drawn apart.
+        """
+        mean, standard_error, trainings = self._by_resample
+        if standard_error is None:
+            return mean
+        return mean + standard_error * _luck(trainings, which)[:, None]
+
+    @property
+    def interval(self) -> Interval:
+        """The means and the ends of their intervals."""
+        return _interval(self.mean, self.drawn())
+
+    def minus(self, other: "Sample") -> Interval:
+        """Return the differences of the means over the same pushes."""
+        return _interval(self.mean - other.mean, self.drawn() - other.drawn(1))
+
+    def over(self, other: "Sample", *, trained_apart: bool = False) -> Interval:
+        """Return the ratios of the means over the same pushes.
+
+        Args:
+            other: the denominator.
+            trained_apart: the denominators are of another model.
+        """
+        drawn = self.drawn() / np.maximum(other.drawn(int(trained_apart)), _FLOOR)
+        return _interval(self.mean / np.maximum(other.mean, _FLOOR), drawn)
 
 
 @lru_cache(maxsize=4)

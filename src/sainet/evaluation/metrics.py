@@ -5,12 +5,13 @@ A new error is one entry of `MEASURED` if it is measured otherwise, and one `Met
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sainet.evaluation.intervals import Folds, Interval, mean_interval, ratio_interval
+from sainet.evaluation.intervals import Folds, Interval, Sample
 
 REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
 
@@ -53,15 +54,20 @@ class ModelErrors:
     reference_m: float  # distance that trans (%) relates to
     folds: Folds | None = None  # of each push, in a cross-validation
 
+    @cached_property
+    def samples(self) -> dict[str, Sample]:
+        """The measured errors with their resamples."""
+        return {name: Sample(v, self.folds) for name, v in self.errors.items()}
+
     def mean(self, name: str, factor: float = 1.0) -> Interval:
         """Return the mean of a measured error times a factor, with its interval."""
-        found = mean_interval(self.errors[name], self.folds)
+        found = self.samples[name].interval
         return found if factor == 1.0 else _times(found, factor)
 
     def per_travel(self, name: str) -> Interval:
         """Return the mean of an error over the mean travel (%), with its interval."""
-        ratio = ratio_interval(self.errors[name], self.travel_mm, self.folds)
-        return _times(ratio, 100)
+        travel = Sample(self.travel_mm, self.folds)
+        return _times(self.samples[name].over(travel), 100)
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,7 @@ import msgspec
 import numpy as np
 
 from sainet.evaluation.conditions import Condition, Provenance, PublishedValues
-from sainet.evaluation.intervals import (
-    Folds,
-    Interval,
-    difference_interval,
-    factor_interval,
-)
+from sainet.evaluation.intervals import Folds, Interval, Sample
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.metrics import MEASURED, METRICS, ModelErrors
 from sainet.evaluation.trials import TrialRow, TrialTest, compare_trials, trial_rows
@@ -221,9 +216,9 @@ class _Part:
         """Yield the paired differences of two models."""
         if not {model, against} <= self.models.keys():
             return
-        one, other = self.models[model].errors, self.models[against].errors
+        one, other = self.models[model].samples, self.models[against].samples
         for metric in MEASURED:
-            found = difference_interval(one[metric], other[metric], self.folds)
+            found = one[metric].minus(other[metric])
             for body in range(self.bodies):
                 yield Comparison(
                     condition=self.condition.label,
@@ -240,19 +235,23 @@ class _Part:
         if baseline is None:
             return
         metric = "final_pos_mm" if self.has_only_ends else "pos_mm"
-        above = baseline.errors[metric].mean(axis=-1, keepdims=True)
+        above = self._over_bodies(baseline, metric)
         for slug, errors in self.models.items():
-            below = errors.errors[metric].mean(axis=-1, keepdims=True)
-            if not np.isfinite(below).all():
+            below = self._over_bodies(errors, metric)
+            if not np.isfinite(below.values).all():
                 continue
             yield Factor(
                 condition=self.condition.label,
                 model=slug,
                 metric=metric,
-                error=float(below.mean()),
-                baseline=float(above.mean()),
-                factor=_estimate(factor_interval(above, below, self.folds), 0),
+                error=float(below.values.mean()),
+                baseline=float(above.values.mean()),
+                factor=_estimate(above.over(below, trained_apart=True), 0),
             )
+
+    def _over_bodies(self, errors: ModelErrors, metric: str) -> Sample:
+        values = errors.errors[metric].mean(axis=-1, keepdims=True)
+        return Sample(values, self.folds)
 
     @property
     def has_only_ends(self) -> bool:
