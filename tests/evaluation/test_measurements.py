@@ -6,10 +6,16 @@ import msgspec
 import numpy as np
 import pytest
 
+from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.conditions import Condition, Header, Provenance
 from sainet.evaluation.joining import add_models, join, pool_trainings
-from sainet.evaluation.measurements import measurements_of, read_measurements
+from sainet.evaluation.measurements import (
+    Measurements,
+    measurements_of,
+    read_measurements,
+)
 from sainet.evaluation.metrics import MEASURED
+from sainet.evaluation.summary import summarise
 from sainet.models.identity import ModelId
 from sainet.runs.errors import BadInput
 
@@ -114,3 +120,16 @@ def test_hostile_files_get_one_line(tmp_path):
     (tmp_path / "b.nc.xz").write_bytes(lzma.compress(whole)[:50])
     with pytest.raises(BadInput, match="cut off"):
         read_measurements(tmp_path / "b.nc.xz")
+
+
+def test_an_error_that_the_file_does_not_have_is_unknown():
+    """A metric that is newer than a file leaves its tables as they are."""
+    found = measured()
+    older = Measurements(found.data.drop_vars("rot_deg"), found.header)
+    rows = to_json_object(summarise(older))
+    assert all(row["rot_deg"] is None for row in rows["rows"])
+    assert {each["metric"] for each in rows["comparisons"]} == {
+        each["metric"]
+        for each in to_json_object(summarise(found))["comparisons"]
+        if each["metric"] != "rot_deg"
+    }

@@ -97,8 +97,11 @@ class Measurements:
     def values(self, name: str, model: str) -> np.ndarray:
         """Return one variable of a model: without padding, ``[training, ...]``.
 
-        A model without several training runs has no axis for them.
+        A model without several training runs has no axis for them. An error that was
+        not measured, because the metric is newer than the file, is NaN.
         """
+        if name not in self.data:
+            return np.full_like(self.data["travel_mm"].values, np.nan)
         found = self.data[name].values[self.slugs.index(model)]
         if self.data[name].dims != PUSHES:
             return found

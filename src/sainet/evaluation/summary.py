@@ -219,6 +219,8 @@ class _Part:
         one, other = self.models[model].samples, self.models[against].samples
         for metric in MEASURED:
             found = one[metric].minus(other[metric])
+            if not np.isfinite(found[0]).any():
+                continue  # unknown of both
             for body in range(self.bodies):
                 yield Comparison(
                     condition=self.condition.label,
