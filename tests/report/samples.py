@@ -102,8 +102,16 @@ def compared(model, against, difference=-0.162, metric="pos_mm"):
 def factor(model, error, baseline=3.6):
     ratio = baseline / error
     estimate = Estimate(ratio, 0.9 * ratio, 1.1 * ratio)
-    names = {"condition": "", "model": model, "metric": "pos_mm"}
-    return Factor(**names, error=error, baseline=baseline, factor=estimate)
+    more = error - baseline
+    return Factor(
+        condition="",
+        model=model,
+        metric="pos_mm",
+        error=error,
+        baseline=baseline,
+        factor=estimate,
+        difference=Estimate(more, more - 0.1, more + 0.1),
+    )
 
 
 def summary(rows, **parts):

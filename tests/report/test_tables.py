@@ -171,9 +171,9 @@ def test_true_properties_that_change_nothing_are_said_once():
 def test_a_table_ends_in_a_verdict():
     text = printed(samples.result(), width=200)
     assert text.rstrip().splitlines()[-1] == (
-        "SAIN: 0.59 mm where the engine errs by 3.60, 6.1 times less [5.5, 6.7]; the "
-        "network alone errs by 0.76; with true masses and radii the engine would err "
-        "by 0.83."
+        "SAIN errs by 0.59 mm, the engine by 3.60 mm, 6.1 times as much [5.5, 6.7]; "
+        "the network without an engine errs by 0.76 mm, the engine with true masses "
+        "and radii by 0.83 mm."
     )
 
 
@@ -181,8 +181,11 @@ def test_a_table_ends_in_a_verdict():
     ("error", "words"),
     [
         (3.5, "no clear difference (ratio 1.03 [0.93, 1.13])"),
-        (7.2, "2.0 times more [1.82, 2.2]"),
-        (1.8, "2.0 times less [1.80, 2.2]"),
+        (7.2, "the engine by 3.60 mm: this model 2.0 times as much [1.82, 2.2]."),
+        (1.8, "the engine by 3.60 mm, 2.0 times as much [1.80, 2.2]."),
+        # Beyond a factor of ten the difference says more.
+        (40.0, "the engine by 3.60 mm: this model 36.40 mm more [36.30, 36.50]."),
+        (0.3, "the engine by 3.60 mm, 3.30 mm more [3.20, 3.40]."),
     ],
 )
 def test_a_verdict_counts_only_what_is_clear(error, words):

@@ -48,11 +48,7 @@ def solves_alike(condition: str) -> Callable[[Summary], Verdict]:
     """Return the rule that no two models differ in the goals that they solve."""
 
     def rule(summary: Summary) -> Verdict:
-        tests = tuple(
-            test
-            for test in summary.tests
-            if test.condition == condition and test.measure == "solved"
-        )
+        tests = _tests_of_solved(summary, condition)
         if not tests:
             return Verdict("not testable here")
         alike = all(test.p >= CHANCE for test in tests)
@@ -172,24 +168,39 @@ def _is_other(factor: Factor, ids: dict[str, ModelId]) -> bool:
 
 
 @dataclass(frozen=True)
-class Solved:
-    """What models solved in one condition, and the pairs that differ."""
+class Ranking:
+    """The goals that models solved in one condition, where chance cannot explain it.
+
+    Attributes:
+        condition: label of the condition.
+        better: each model that solved more goals than others, with these others.
+    """
 
     condition: str
-    rows: tuple[TrialRow, ...]
-    differing: tuple[TrialTest, ...]
+    better: tuple[tuple[TrialRow, tuple[TrialRow, ...]], ...]
 
 
-def solved(summary: Summary, condition: str) -> Solved:
-    """Return what models solved, and which differences are more than chance."""
-    return Solved(
-        condition,
-        tuple(row for row in summary.trials if row.condition == condition),
-        tuple(
-            test
-            for test in summary.tests
-            if test.condition == condition
-            and test.measure == "solved"
-            and test.p < CHANCE
-        ),
+def rank_models(summary: Summary, condition: str) -> Ranking:
+    """Return which models solved more goals than which by more than chance."""
+    rows = {row.model: row for row in summary.trials if row.condition == condition}
+    worse: dict[str, list[TrialRow]] = {slug: [] for slug in rows}
+    for test in _tests_of_solved(summary, condition):
+        if test.p < CHANCE:
+            pair = test.model, test.against
+            more, fewer = pair if test.only_one > test.only_other else pair[::-1]
+            worse[more].append(rows[fewer])
+    found = [
+        (rows[slug], tuple(sorted(others, key=lambda row: -row.solved)))
+        for slug, others in worse.items()
+        if others
+    ]
+    found.sort(key=lambda each: -each[0].solved)
+    return Ranking(condition, tuple(found))
+
+
+def _tests_of_solved(summary: Summary, condition: str) -> tuple[TrialTest, ...]:
+    return tuple(
+        test
+        for test in summary.tests
+        if test.condition == condition and test.measure == "solved"
     )

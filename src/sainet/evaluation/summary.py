@@ -55,6 +55,7 @@ class Factor(msgspec.Struct, frozen=True, kw_only=True):
     error: float
     baseline: float  # error of the engine
     factor: Estimate
+    difference: Estimate = Estimate()  # error of the model minus that of the engine
 
 
 class Summary(msgspec.Struct, frozen=True, kw_only=True):
@@ -249,6 +250,7 @@ class _Part:
                 error=float(below.values.mean()),
                 baseline=float(above.values.mean()),
                 factor=_estimate(above.over(below, trained_apart=True), 0),
+                difference=_estimate(below.minus(above), 0),
             )
 
     def _over_bodies(self, errors: ModelErrors, metric: str) -> Sample:

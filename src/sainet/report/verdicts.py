@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from sainet.evaluation.claims import Claim, Places, best_network, solved
+from sainet.evaluation.claims import Claim, Places, best_network, rank_models
 from sainet.evaluation.metrics import METRICS
 from sainet.evaluation.summary import Comparison, Summary
 from sainet.report.pages.templates import render_text
@@ -10,12 +10,20 @@ from sainet.report.palette import labels_of
 
 
 def verdicts_on(summary: Summary) -> tuple[str, ...]:
-    """Return a sentence for each condition: the best network beside the engine."""
+    """Return what a reader should take from a table.
+
+    Of errors, a sentence for each condition: the best network beside the engine. Of
+    trials, which models solved more goals than others; nothing for a single model.
+    """
     labels = labels_of(summary.models)
     conditions = [condition.label for condition in summary.conditions]
     if summary.is_of_trials:
-        found = [solved(summary, condition) for condition in conditions]
-        return (_worded("solved", labels=labels, conditions=found),)
+        if not summary.tests:
+            return ()
+        found = [rank_models(summary, condition) for condition in conditions]
+        level = [each.condition or "here" for each in found if not each.better]
+        apart = [each for each in found if each.better]
+        return (_worded("solved", labels=labels, level=level, apart=apart),)
     best = [best_network(summary, condition) for condition in conditions]
     return tuple(_worded("best", labels=labels, verdict=b) for b in best if b)
 
