@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 
 from sainet import PlanarEngine, PushGrid, Scene
-from sainet.engines.assumed import AssumedProperties
+from sainet.engines.base import AssumedProperties
 from sainet.models.dynamics import PhysicsDynamics, predict
 from sainet.scenes.pushes import command_path
 from sainet.scenes.state import at_rest

@@ -45,10 +45,10 @@ from sainet.datasets.schema import variables  # noqa: E402
 from sainet.datasets.store import open_store  # noqa: E402
 from sainet.datasets.writer import write_store  # noqa: E402
 from sainet.engines.simulator import InternalEngine, PlanarSpec  # noqa: E402
-from sainet.models.card import read_card  # noqa: E402
-from sainet.models.identified import (  # noqa: E402
+from sainet.models.card import (  # noqa: E402
     Estimate,
     Identified,
+    read_card,  # noqa: E402
     read_identified,
 )
 from sainet.models.library import load_model  # noqa: E402

@@ -12,12 +12,12 @@ __version__ = "0.1.0"
 _HOMES = {
     "AbstractDynamics": "sainet.models.dynamics",
     "AbstractEngine": "sainet.engines.base",
-    "AssumedProperties": "sainet.engines.assumed",
+    "AssumedProperties": "sainet.engines.base",
     "ControlConfig": "sainet.control.config",
     "ForceControls": "sainet.scenes.controls",
     "GenerateConfig": "sainet.datasets.config",
     "InteractionNetwork": "sainet.models.correctors.interaction",
-    "Model": "sainet.models.model",
+    "Model": "sainet.models.library",
     "ModelId": "sainet.models.identity",
     "PathControls": "sainet.scenes.controls",
     "PlanarEngine": "sainet.engines.planar.engine",
@@ -50,8 +50,7 @@ if TYPE_CHECKING:
     from sainet.datasets.generate import generate
     from sainet.datasets.store import open_store
     from sainet.engines import make_engine
-    from sainet.engines.assumed import AssumedProperties
-    from sainet.engines.base import AbstractEngine
+    from sainet.engines.base import AbstractEngine, AssumedProperties
     from sainet.engines.planar.engine import PlanarEngine
     from sainet.evaluation.evaluate import evaluate
     from sainet.identification.identify import identify
@@ -60,8 +59,7 @@ if TYPE_CHECKING:
     from sainet.models.correctors.interaction import InteractionNetwork
     from sainet.models.dynamics import AbstractDynamics, predict
     from sainet.models.identity import ModelId
-    from sainet.models.library import load_model
-    from sainet.models.model import Model
+    from sainet.models.library import Model, load_model
     from sainet.planning import make_planner
     from sainet.scenes.controls import ForceControls, PathControls
     from sainet.scenes.pushes import Push, PushGrid

@@ -19,7 +19,7 @@ from sainet.datasets.store import open_store
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import simulator_named
-from sainet.models.frame import push_frame
+from sainet.models.inputs import push_frame
 from sainet.runs.errors import BadStore
 
 PUSHES = 48

@@ -8,8 +8,7 @@ import pytest
 from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
-from sainet.engines.assumed import AssumedProperties
-from sainet.engines.base import roll_out
+from sainet.engines.base import AssumedProperties, roll_out
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.simulator import TRUE_PROPERTIES, Assumptions
 from sainet.runs.errors import UnknownName

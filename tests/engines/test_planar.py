@@ -16,8 +16,8 @@ from engines.naive import Body, World
 from sainet.datasets.config import GenerateConfig
 from sainet.engines.base import roll_out
 from sainet.engines.planar import engine as planar
-from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.engines.planar.solver import contact_budget, solve_close_pairs
 from sainet.scenes.scene import FrictionField
 from sainet.scenes.shapes import pair_gaps, pusher_gaps
 

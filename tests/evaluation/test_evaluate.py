@@ -11,7 +11,7 @@ from learning.stores import end_points_alone, info_of, made_up, quiet_store, wri
 from models.samples import quick_dynamics
 from sainet.datasets.batch import to_batch
 from sainet.engines import make_engine
-from sainet.engines.assumed import AssumedProperties
+from sainet.engines.base import AssumedProperties
 from sainet.engines.simulator import Assumptions
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.evaluate import evaluate
@@ -20,8 +20,7 @@ from sainet.evaluation.summary import summarise
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.identity import ModelId
-from sainet.models.library import load_model
-from sainet.models.model import Model
+from sainet.models.library import Model, load_model
 from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, Diverged
 from sainet.scenes.state import State, Trajectory

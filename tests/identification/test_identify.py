@@ -18,7 +18,6 @@ from sainet.datasets.writer import write_store
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.identification import intervals as intervals_module
 from sainet.identification.identify import identify, identify_into
-from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     doubt,
     from_coordinate,
@@ -28,8 +27,8 @@ from sainet.identification.parameters import (
     to_engine,
     with_values,
 )
-from sainet.identification.residuals import Scale, residuals, samples, slopes
-from sainet.models.identified import FILE, read_identified
+from sainet.identification.residuals import Scale, intervals, residuals, samples, slopes
+from sainet.models.card import IDENTIFIED, read_identified
 from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.errors import BadInput, BadStore, RunConflict
 
@@ -188,17 +187,19 @@ def test_the_folder_is_accepted_as_a_model(store, tmp_path):
     assert isinstance(engine.engine, PlanarEngine)
     with pytest.raises(BadInput, match="of the planar engine, not of bullet"):
         load_model(str(out), engine="bullet")
-    before = (out / FILE).stat().st_mtime_ns
+    before = (out / IDENTIFIED).stat().st_mtime_ns
     assert identify_into(store, out) == result
-    assert (out / FILE).stat().st_mtime_ns == before
+    assert (out / IDENTIFIED).stat().st_mtime_ns == before
     with pytest.raises(RunConflict, match="data is"):
         identify_into(store.first(5), out)
-    (out / FILE).write_text("{}")
-    with pytest.raises(BadInput, match=f"{FILE}: .*missing.* Delete {out}, then"):
+    (out / IDENTIFIED).write_text("{}")
+    with pytest.raises(BadInput, match=f"{IDENTIFIED}: .*missing.* Delete {out}, then"):
         identify_into(store, out)
-    (out / FILE).unlink()  # as if it had been interrupted
+    (out / IDENTIFIED).unlink()  # as if it had been interrupted
     for use in (load_model, find_internal_engine):
-        with pytest.raises(BadInput, match=f"{FILE}: missing, so .* 'sainet identify'"):
+        with pytest.raises(
+            BadInput, match=f"{IDENTIFIED}: missing, so .* 'sainet identify'"
+        ):
             use(str(out))
 
 
@@ -236,11 +237,11 @@ def found_with(*, friction=0.3, ratio=0.5, camera=None, pushes=3, engine=None) -
     ],
 )
 def test_a_damaged_file_is_named(tmp_path, text, says):
-    (tmp_path / FILE).write_text(text.replace('"%s"', "1" + "0" * 400))
+    (tmp_path / IDENTIFIED).write_text(text.replace('"%s"', "1" + "0" * 400))
     if says is None:
         read_identified(tmp_path)
         return
-    with pytest.raises(BadInput, match=rf"{FILE}: .*{says}.* Delete ") as raised:
+    with pytest.raises(BadInput, match=rf"{IDENTIFIED}: .*{says}.* Delete ") as raised:
         read_identified(tmp_path)
     assert "\n" not in str(raised.value)
     assert len(str(raised.value)) < 600

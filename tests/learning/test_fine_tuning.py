@@ -8,9 +8,9 @@ from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
 from sainet.datasets.batch import to_batch, to_controls, to_initial
 from sainet.learning import fit as fit_module
-from sainet.learning.batch import path_to_frame, predict_batch
-from sainet.learning.best import Best
 from sainet.learning.fit import fit
+from sainet.learning.held import predict_batch
+from sainet.learning.loss import loss_weights, path_to_frame
 from sainet.learning.recipes import (
     FINE_TUNING,
     PAPER,
@@ -18,13 +18,12 @@ from sainet.learning.recipes import (
     FromModel,
     FromSimulator,
 )
-from sainet.learning.statistics import loss_weights
-from sainet.learning.step import trained_layers
+from sainet.learning.step import Best, trained_layers
 from sainet.learning.task import Existing, Task, begin
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import predict
-from sainet.models.frame import push_frame
+from sainet.models.inputs import push_frame
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.digests import pushes_overlap

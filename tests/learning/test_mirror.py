@@ -10,7 +10,7 @@ import pytest
 from learning.stores import info_of, made_up, quiet_store, single, write
 from sainet.datasets.batch import to_batch
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.learning.mirror import mirror, mirror_some
+from sainet.learning.batches import mirror, mirror_some
 from sainet.learning.recipes import PAPER
 from sainet.learning.task import Task
 from sainet.models.library import find_internal_engine

@@ -10,11 +10,11 @@ from models.samples import Glide, network, pushes
 from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.learning.batch import predict_batch
+from sainet.learning.batches import to_single_steps
 from sainet.learning.checks import check_task
 from sainet.learning.fit import fit
+from sainet.learning.held import predict_batch
 from sainet.learning.recipes import PAPER, SingleSteps
-from sainet.learning.single_steps import to_single_steps
 from sainet.learning.task import Task, begin
 from sainet.models.card import read_card
 from sainet.models.dynamics import (
@@ -23,9 +23,9 @@ from sainet.models.dynamics import (
     SimulatorAugmented,
     predict,
 )
-from sainet.models.frame import motion_to_frame, push_frame
+from sainet.models.inputs import motion_to_frame, push_frame
 from sainet.models.library import find_internal_engine, load_model
-from sainet.models.restarted import Restarted
+from sainet.models.wrappers import Restarted
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.state import pack_motion
 

@@ -10,10 +10,14 @@ from learning.stores import end_points_alone, info_of, made_up, single
 from models import naive
 from models.samples import network
 from sainet.datasets.batch import to_batch
-from sainet.learning.batch import predict_batch, to_target
-from sainet.learning.loss import LossWeights
+from sainet.learning.held import predict_batch
+from sainet.learning.loss import (
+    LossWeights,
+    feature_scales,
+    loss_weights,
+    to_target,
+)
 from sainet.learning.recipes import PAPER, Objective, Optimiser
-from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import (
     data_loss,
     even_batch,

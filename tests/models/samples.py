@@ -11,10 +11,10 @@ from msgspec import structs
 
 from contracts.worlds import engine, pushed
 from sainet.datasets.config import GenerateConfig
-from sainet.engines.assumed import AssumedProperties
-from sainet.engines.base import AbstractEngine
+from sainet.engines.base import AbstractEngine, AssumedProperties
 from sainet.engines.simulator import PAPER, InternalEngine
 from sainet.identification.parameters import to_engine
+from sainet.models.card import IDENTIFIED, Identified
 from sainet.models.correctors.interaction import InteractionNetwork, Scales
 from sainet.models.dynamics import (
     AbstractDynamics,
@@ -23,7 +23,6 @@ from sainet.models.dynamics import (
     SimulatorAugmented,
 )
 from sainet.models.features import feature_set
-from sainet.models.identified import FILE, Identified
 from sainet.models.integrators import Acceleration, RelaxingResidual
 from sainet.runs.documents import write_document
 from sainet.scenes.controls import Controls
@@ -140,5 +139,5 @@ def identified_folder(folder: Path, **values: float) -> InternalEngine:
     engine = to_engine(values)
     errors = dict.fromkeys(("before_mm", "after_mm", "before_deg", "after_deg"), 1.0)
     found = Identified(engine=engine, estimates=(), pushes=1, **errors)
-    write_document(folder / FILE, found)
+    write_document(folder / IDENTIFIED, found)
     return engine

@@ -8,10 +8,10 @@ import pytest
 from contracts.worlds import pushed
 from models.samples import network
 from sainet.datasets.config import GenerateConfig
-from sainet.engines.assumed import AssumedProperties
+from sainet.engines.base import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.models.camera import OffsetCamera, with_camera
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
+from sainet.models.wrappers import OffsetCamera, with_camera
 from sainet.scenes.camera import CameraOffset
 from sainet.scenes.controls import PathControls
 from sainet.scenes.state import pack_motion

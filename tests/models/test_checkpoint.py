@@ -9,9 +9,8 @@ import pytest
 
 from models.samples import network
 from sainet.engines.simulator import PAPER, PlanarSpec
-from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
-from sainet.models.checkpoint import load_network
+from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.dynamics import LearnedDynamics, PhysicsDynamics, SimulatorAugmented
 from sainet.models.identity import ModelId
 from sainet.models.library import PHYSICS, load_model

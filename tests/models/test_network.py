@@ -18,6 +18,7 @@ from models.samples import (
     quick_dynamics,
 )
 from sainet.engines.base import AbstractEngine
+from sainet.learning.task import widen
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.dynamics import (
     PhysicsDynamics,
@@ -26,14 +27,15 @@ from sainet.models.dynamics import (
     stored_prediction,
 )
 from sainet.models.features import feature_set
-from sainet.models.frame import (
+from sainet.models.inputs import (
+    in_columns,
     motion_from_frame,
     motion_to_frame,
+    near_pairs,
     push_frame,
+    still_features,
 )
-from sainet.models.inputs import in_columns, near_pairs, still_features
 from sainet.models.integrators import RelaxingResidual
-from sainet.models.widen import widen
 from sainet.scenes.pushes import Push, command_path
 from sainet.scenes.scene import TIME_STEP
 from sainet.scenes.shapes import pair_gaps

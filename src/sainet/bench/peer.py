@@ -12,11 +12,10 @@ import numpy as np
 from jaxtyping import Array
 
 from sainet.bench.problem import Problem
-from sainet.learning.batch import path_to_frame, to_target
-from sainet.models.bounded import GRADIENT_BOUND, GRADIENT_SIZES
+from sainet.learning.loss import path_to_frame, to_target
 from sainet.models.correctors.interaction import FEATURE_BOUND
-from sainet.models.frame import motion_to_frame, push_frame
-from sainet.models.inputs import drives, still_features
+from sainet.models.inputs import drives, motion_to_frame, push_frame, still_features
+from sainet.models.integrators import GRADIENT_BOUND, GRADIENT_SIZES
 from sainet.runs.errors import SainetError
 from sainet.scenes.state import pack_motion
 

@@ -19,8 +19,7 @@ from sainet.control.record import (
 )
 from sainet.control.trial import make_trial
 from sainet.engines import make_engine
-from sainet.models.library import load_model
-from sainet.models.model import Model
+from sainet.models.library import Model, load_model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document, write_json

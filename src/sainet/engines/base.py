@@ -1,9 +1,12 @@
-"""The interface of engines."""
+"""The interface of engines, and the wrapper that substitutes assumed properties."""
 
 from abc import abstractmethod
 
 import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
 
+from sainet.engines.simulator import PAPER, Assumptions
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -40,3 +43,52 @@ def _compiled(
     engine: AbstractEngine, scene: Scene, initial: State, controls: Controls
 ) -> Trajectory:
     return engine.rollout(scene, initial, controls)
+
+
+class AssumedProperties(AbstractEngine):
+    """Wraps an engine and replaces properties of the scene by assumed ones.
+
+    Disks are not re-seated: where an assumed radius differs from the true one, they
+    overlap or leave a gap at the start, and the engine has to deal with it. A friction
+    field is never assumed.
+    """
+
+    engine: AbstractEngine
+    assumptions: Assumptions = eqx.field(static=True, default=PAPER)
+
+    def assume(self, scene: Scene) -> Scene:
+        """Return the scene with the assumed properties."""
+        assumed = self.assumptions
+        return Scene(
+            mass=_replace(scene.mass, assumed.mass),
+            radius=_replace(scene.radius, assumed.radius),
+            table_friction=_fill(scene.table_friction, assumed.table_friction),
+            disk_friction=_fill(scene.disk_friction, assumed.disk_friction),
+            pusher_friction=_fill(scene.pusher_friction, assumed.pusher_friction),
+            pusher_radius=scene.pusher_radius,
+            time_step=scene.time_step,
+        )
+
+    @property
+    def on_host(self) -> bool:
+        """Whether the wrapped engine works outside JAX."""
+        return self.engine.on_host
+
+    def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
+        """Roll the wrapped engine out in the assumed scene."""
+        return self.engine.rollout(self.assume(scene), initial, controls)
+
+
+def _fill(true: Array, assumed: float | None) -> Array:
+    return true if assumed is None else jnp.full_like(true, assumed)
+
+
+def _replace(
+    true: Float[Array, "*batch body"], assumed: tuple[float, ...] | None
+) -> Float[Array, "*batch body"]:
+    if assumed is None:
+        return true
+    mean = sum(assumed) / len(assumed)
+    count = true.shape[-1]
+    values = (*assumed, *[mean] * count)[:count]
+    return jnp.broadcast_to(jnp.array(values, true.dtype), true.shape)

@@ -17,7 +17,7 @@ from sainet.scenes.camera import AGREES, CameraOffset
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
 
 if TYPE_CHECKING:
-    from sainet.engines.assumed import AssumedProperties
+    from sainet.engines.base import AssumedProperties
 
 UNIFORM_PRESSURE = (
     2 / 3
@@ -74,7 +74,7 @@ class PlanarSpec(_Spec, frozen=True, kw_only=True, tag="planar"):
 
     def build(self) -> "AssumedProperties":
         """Return the engine with its assumptions."""
-        from sainet.engines.assumed import AssumedProperties
+        from sainet.engines.base import AssumedProperties
         from sainet.engines.planar.engine import PlanarEngine
 
         engine = PlanarEngine(pressure_radius_ratio=self.pressure_radius_ratio)
@@ -92,7 +92,7 @@ class BulletSpec(_Spec, frozen=True, kw_only=True, tag="bullet"):
         Raises:
             MissingExtra: PyBullet is not installed.
         """
-        from sainet.engines.assumed import AssumedProperties
+        from sainet.engines.base import AssumedProperties
         from sainet.engines.bullet.engine import BulletEngine
 
         return AssumedProperties(BulletEngine(), self.assumptions)

@@ -24,7 +24,7 @@ from sainet.evaluation.metrics import (
 )
 from sainet.models.dynamics import AbstractDynamics
 from sainet.models.identity import ModelId
-from sainet.models.model import Model
+from sainet.models.library import Model
 from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import predict_ends
-from sainet.models.model import Model
+from sainet.models.library import Model
 
 
 @dataclass(frozen=True)

@@ -1,29 +1,82 @@
 """Estimation of the planar engine's parameters, by gradients through the engine."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.optimize import least_squares
 
 from sainet.datasets.store import Store
-from sainet.identification.intervals import intervals
 from sainet.identification.parameters import (
     BOUNDS,
     FRICTIONS,
     NAMES,
+    bounds_of,
     doubt,
+    from_coordinate,
     names_for,
     starting_values,
+    to_coordinate,
     to_engine,
 )
-from sainet.identification.residuals import Sample, Scale, pose_errors, samples
-from sainet.identification.solve import Try, solve
-from sainet.models.identified import FILE, Estimate, Identified, read_identified
+from sainet.identification.residuals import (
+    Sample,
+    Scale,
+    intervals,
+    pose_errors,
+    residuals,
+    samples,
+    slopes,
+)
+from sainet.models.card import IDENTIFIED, Estimate, Identified, read_identified
 from sainet.runs.documents import write_document
 from sainet.runs.errors import BadStore
 from sainet.runs.folders import open_run
+
+Try = Callable[[float], None]  # called with the root mean square of all errors
+
+_INSIDE = 1e-3  # distance of initial coordinates from the bounds
+
+
+def solve(
+    start: Mapping[str, float],
+    free: Sequence[str],
+    scale: Scale,
+    parts: Sequence[Sample],
+    *,
+    on_try: Try,
+) -> dict[str, float]:
+    """Return all values, with the free parameters at the least-squares solution."""
+    bounds = bounds_of(free)
+    before = {name: to_coordinate(name, value) for name, value in start.items()}
+
+    def at(vector: np.ndarray) -> dict[str, float]:
+        return before | dict(zip(free, vector.tolist(), strict=True))
+
+    def residual(vector: np.ndarray) -> np.ndarray:
+        found = [residuals(at(vector), scale, part).ravel() for part in parts]
+        whole = np.concatenate(found)
+        on_try(float(np.sqrt(np.mean(whole**2))))
+        return whole
+
+    def slope(vector: np.ndarray) -> np.ndarray:
+        found = [slopes(at(vector), free, scale, part) for part in parts]
+        return np.concatenate([part.reshape(-1, len(free)) for part in found])
+
+    solution = least_squares(
+        residual,
+        np.clip(
+            [before[name] for name in free], bounds[0] + _INSIDE, bounds[1] - _INSIDE
+        ),
+        slope,  # pyright: ignore[reportArgumentType]
+        bounds=bounds,
+        loss="soft_l1",
+        x_scale="jac",
+    )
+    return {name: from_coordinate(name, x) for name, x in at(solution.x).items()}
+
 
 _log = logging.getLogger(__name__)
 
@@ -45,9 +98,9 @@ def identify_into(
     """
     settings = {"command": "identify", "data": store.content, "parameters": NAMES}
     check_store(store)
-    folder = open_run(out, settings, finished_by=FILE)
+    folder = open_run(out, settings, finished_by=IDENTIFIED)
     if not folder.is_finished:
-        write_document(out / FILE, identify(store, on_try=on_try))
+        write_document(out / IDENTIFIED, identify(store, on_try=on_try))
     return read_identified(out)
 
 

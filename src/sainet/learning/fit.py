@@ -14,12 +14,12 @@ from jaxtyping import Array
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
-from sainet.learning.best import Best
 from sainet.learning.checks import check_task
 from sainet.learning.log import append_log, read_log, rewind_log
 from sainet.learning.loss import LossWeights
 from sainet.learning.recipes import FROM_ENGINE, FromModel, ModelKind, Recipe, Start
 from sainet.learning.step import (
+    Best,
     FitState,
     data_loss,
     even_batch,
@@ -27,9 +27,8 @@ from sainet.learning.step import (
     trained_layers,
 )
 from sainet.learning.task import Existing, Task, begin, settings
-from sainet.models.arrays import load_arrays, save_arrays
 from sainet.models.card import CARD, WEIGHTS, Card
-from sainet.models.checkpoint import load_network
+from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.identity import ModelId, TrainingData
 from sainet.models.integrators import RelaxingResidual

@@ -1,4 +1,4 @@
-"""Zero-order hold: training additive networks on long pushes.
+"""Predictions while training, with a zero-order hold for additive networks.
 
 The output of an additive network is small and changes slowly, while a long push has a
 thousand steps. Training computes it every few steps and reuses it in between; the
@@ -6,6 +6,7 @@ motion that follows from the held output is exact. The paper's networks predict 
 whole motion and cannot be held: they brake and kick within a step.
 """
 
+from functools import partial
 from typing import Any
 
 import jax
@@ -14,10 +15,33 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Float
 
-from sainet.models.bounded import bound_gradient
-from sainet.models.correctors.interaction import InteractionNetwork
-from sainet.models.inputs import Drive, Moment, Still, in_columns
-from sainet.models.integrators import Gains, RelaxingResidual
+from sainet.datasets.batch import PushBatch
+from sainet.models.correctors import Start
+from sainet.models.correctors.interaction import InteractionNetwork, unroll
+from sainet.models.inputs import Drive, Moment, Still, in_columns, push_frame
+from sainet.models.integrators import Gains, RelaxingResidual, bound_gradient
+
+
+def predict_batch(
+    network: InteractionNetwork, batch: PushBatch, hold: int = 1
+) -> Float[Array, "time push body 6"]:
+    """Predict each push recurrently from its start, with the stored s-bar (eq. 1).
+
+    Args:
+        network: IN or SAIN.
+        batch: of pushes, with s-bar for SAIN.
+        hold: length of the zero-order hold of an additive network (steps).
+    """
+    is_held = isinstance(network.integrator, RelaxingResidual) and hold > 1
+    initial, has_simulator = batch.initial, network.features.has_simulator
+    frame = push_frame(batch.scene, initial)
+    return network.in_frame(
+        batch.scene,
+        Start(initial, frame, initial if has_simulator else None),
+        batch.controls,
+        batch.simulated if has_simulator else None,
+        unroll=partial(unroll_held, hold=hold) if is_held else unroll,
+    )
 
 
 def unroll_held(

@@ -1,8 +1,28 @@
-"""How far predicted pushes are from what was observed of them."""
+"""The loss of predicted pushes, with the scales of all terms from the data."""
+
+from collections.abc import Callable
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
+
+from sainet.datasets.batch import PushBatch
+from sainet.learning.recipes import Objective
+from sainet.models.correctors.interaction import Scales
+from sainet.models.features import FeatureSet
+from sainet.models.inputs import (
+    Drive,
+    Moment,
+    PushFrame,
+    drives,
+    in_columns,
+    motion_to_frame,
+    push_frame,
+    still_features,
+)
+from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
+from sainet.scenes.state import pack_motion
 
 
 class LossWeights(eqx.Module):
@@ -75,3 +95,154 @@ def _masked_error(predicted: Array, true: Array, observed: Array, error) -> Arra
     errors = jnp.sum(error(predicted, jnp.where(known, true, predicted)), axis=-1)
     count = jnp.maximum(jnp.sum(observed, axis=0), 1)
     return jnp.sum(jnp.where(observed, errors, 0.0), axis=0) / count
+
+
+def to_target(batch: PushBatch) -> Target:
+    """Return the observed motion: measured poses, velocities of the ground truth."""
+    frame = push_frame(batch.scene, batch.initial)
+    motion = jnp.concatenate([batch.measured, batch.truth[..., 3:6]], axis=-1)
+    local = path_to_frame(motion, frame)
+    return Target(
+        pose=local[..., 0:3],
+        rate=local[..., 3:6],
+        pose_observed=batch.pose_observed.T,
+        rate_observed=batch.rate_observed.T,
+    )
+
+
+def path_to_frame(
+    motion: Float[Array, "push time body 6"], frame: PushFrame
+) -> Float[Array, "time push body 6"]:
+    """Turn packed motion over time into the push frame, time first."""
+    return jax.vmap(motion_to_frame, in_axes=(1, None))(motion, frame)
+
+
+# A deviation below this, or this share of the mean, is rounding: nothing varies.
+_CONSTANT, _CONSTANT_SHARE = 1e-9, 1e-4
+_STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is rounding
+
+
+@eqx.filter_jit
+def feature_scales(
+    batch: PushBatch,
+    features: FeatureSet,
+    integrator: Integrator = Acceleration(),  # noqa: B008
+) -> Scales:
+    """Return means and deviations of a network's inputs along the true paths.
+
+    The scale of its output is the acceleration of the bodies or, for an additive
+    network, the acceleration that corrects the engine.
+    """
+    frame = push_frame(batch.scene, batch.initial)
+    motion = path_to_frame(_known_motion(batch), frame)
+    start = motion_to_frame(pack_motion(batch.initial), frame)
+    before = jnp.concatenate([start[None], motion[:-1]])
+    simulated = None
+    if features.has_simulator and batch.simulated is not None:
+        simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
+    drive = drives(batch.controls.in_frame(frame.origin, frame.angle), start, simulated)
+    drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
+    still = in_columns(still_features(batch.scene, frame))
+    columns = jax.vmap(in_columns)((before, drive))
+
+    def spread(inputs: Callable[[Moment], Array]) -> tuple[Array, Array]:
+        def at(now: tuple[Array, Drive]) -> Array:
+            return inputs(Moment(now[0], still, now[1]))
+
+        return _spread(jax.vmap(at, out_axes=1)(columns))
+
+    body_mean, body_deviation = spread(features.of_bodies)
+    if batch.scene.body_count > 1:
+        pair_mean, pair_deviation = spread(features.of_pairs)
+    else:
+        size = features.pair_size
+        pair_mean, pair_deviation = jnp.zeros(size), jnp.ones(size)
+    change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
+    size = jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
+    if isinstance(integrator, RelaxingResidual):
+        size = _correction(batch, integrator)
+    return Scales(
+        pair_mean=pair_mean,
+        pair_deviation=pair_deviation,
+        body_mean=body_mean,
+        body_deviation=body_deviation,
+        # x and y share a scale: no direction of the frame counts more.
+        acceleration=jnp.array([size[:2].mean(), size[:2].mean(), size[2]]),
+    )
+
+
+def _spread(features: Array) -> tuple[Array, Array]:
+    rows = features.reshape(features.shape[0], -1)
+    mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
+    # A feature that never varies must not be divided by rounding errors.
+    varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
+    return mean, jnp.where(varies, deviation, 1.0)
+
+
+@eqx.filter_jit
+def loss_weights(batch: PushBatch, objective: Objective) -> LossWeights:
+    """Return the weights of the objective over mean squares in the data.
+
+    The mean squares are those of the motion, or of the errors of s-bar where the truth
+    was observed: training is to reduce errors, and where only the end of a push is
+    known, position and rotation would otherwise have very unequal weights.
+    """
+    by_motion = objective.terms == "motion"
+    pose, rate = _motion(batch) if by_motion else _errors(batch)
+    place = jnp.nanmean(jnp.sum(pose[..., 0:2] ** 2, axis=-1))
+    velocity = jnp.nanmean(jnp.sum(rate[..., 0:2] ** 2, axis=-1))
+    turn = jnp.nanmean(pose[..., 2] ** 2)
+    return LossWeights(
+        position=objective.weight_position / _nonzero(place),
+        rotation=objective.weight_rotation / _nonzero(turn),
+        velocity=objective.weight_velocity / _nonzero(velocity),
+        spin=objective.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
+        linear_from=objective.linear_from,
+    )
+
+
+def _motion(batch: PushBatch) -> tuple[Array, Array]:
+    """Return how far bodies have moved, and their velocities."""
+    motion = _known_motion(batch)
+    start = pack_motion(batch.initial)[:, None]
+    return motion[..., 0:3] - start[..., 0:3], motion[..., 3:6]
+
+
+def _errors(batch: PushBatch) -> tuple[Array, Array]:
+    """Return the errors of s-bar, NaN where the truth was not observed."""
+    assert batch.simulated is not None
+    error = batch.truth - batch.simulated
+
+    def where(observed: Array, part: Array) -> Array:
+        return jnp.where(observed[:, :, None, None], part, jnp.nan)
+
+    return (
+        where(batch.pose_observed, error[..., 0:3]),
+        where(batch.rate_observed, error[..., 3:6]),
+    )
+
+
+def _correction(batch: PushBatch, integrator: RelaxingResidual) -> Array:
+    """Return the constant acceleration that deviates as far as s-bar errs.
+
+    By mean absolute errors, which failed recordings do not dominate: of x and y (m/s^2)
+    and of the angle (rad/s^2).
+    """
+    pose, _ = _errors(batch)
+    gains = integrator.gains(batch.scene.time_step, pose.shape[1])
+    gain = jnp.asarray(gains.pose_of_change)
+    reached = jnp.where(jnp.isnan(pose), jnp.nan, gain[:, None, None])
+    size = jnp.nanmean(jnp.abs(pose), axis=(0, 1, 2))
+    return _nonzero(size / jnp.nanmean(reached, axis=(0, 1, 2)))
+
+
+def _nonzero(size: Array) -> Array:
+    """Return a size, or 1 where it is zero, for example of a disk that never turns."""
+    return jnp.where(size > _STILL, size, 1.0)
+
+
+def _known_motion(batch: PushBatch) -> Array:
+    """Return the true motion, or the simulated motion where the truth is unknown."""
+    if batch.simulated is None:
+        return jnp.nan_to_num(batch.truth)
+    return jnp.where(jnp.isnan(batch.truth), batch.simulated, batch.truth)

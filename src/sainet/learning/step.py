@@ -11,12 +11,12 @@ import optax
 from jax import lax
 from jax.flatten_util import ravel_pytree
 from jax.sharding import NamedSharding, PartitionSpec
-from jaxtyping import Array
+from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch
 from sainet.engines.devices import BATCH, batch_mesh
-from sainet.learning.batch import predict_batch, to_target
-from sainet.learning.loss import LossWeights, push_losses
+from sainet.learning.held import predict_batch
+from sainet.learning.loss import LossWeights, push_losses, to_target
 from sainet.learning.recipes import Optimiser, Recipe
 from sainet.models.correctors.interaction import InteractionNetwork
 
@@ -242,3 +242,32 @@ def even_batch(batch: PushBatch) -> PushBatch:
         padded,
         (padded.pose_observed & real[:, None], padded.rate_observed & real[:, None]),
     )
+
+
+class Best(eqx.Module):
+    """Its layers, and when and how good it was; part of a checkpoint."""
+
+    layers: Trained
+    loss: Float[Array, ""]  # on the validation pushes
+    iteration: Int[Array, ""]
+
+    @staticmethod
+    def first(network: InteractionNetwork, loss: float) -> "Best":
+        """Return the network that training begins with: it may remain the best."""
+        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(0))
+
+    def or_better(
+        self, network: InteractionNetwork, loss: float, iteration: int
+    ) -> "Best":
+        """Return the better one of this and another network."""
+        if not loss < float(self.loss):
+            return self
+        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(iteration))
+
+    def is_stale(self, iteration: int, patience: int) -> bool:
+        """Return whether nothing has become better for so many iterations."""
+        return 0 < patience <= iteration - int(self.iteration)
+
+    def put_into(self, network: InteractionNetwork) -> InteractionNetwork:
+        """Return the network with the best layers."""
+        return with_layers(network, self.layers)

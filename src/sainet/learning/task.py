@@ -5,7 +5,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import msgspec
 import numpy as np
 
@@ -15,8 +17,8 @@ from sainet.datasets.schema import simulated_name, variables
 from sainet.datasets.splits import split_rows
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
-from sainet.learning.loss import LossWeights
-from sainet.learning.mirror import mirror_some
+from sainet.learning.batches import mirror_some, to_single_steps
+from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import (
     FROM_ENGINE,
     FromSimulator,
@@ -24,14 +26,12 @@ from sainet.learning.recipes import (
     Recipe,
     SingleSteps,
 )
-from sainet.learning.single_steps import to_single_steps
-from sainet.learning.statistics import feature_scales, loss_weights
 from sainet.learning.step import FitState, first_state
 from sainet.models.card import Card
+from sainet.models.checkpoint import untrained
 from sainet.models.correctors.interaction import InteractionNetwork, Scales
-from sainet.models.features import FeatureSet, feature_set
+from sainet.models.features import FeatureSet, Place, feature_set
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
-from sainet.models.widen import widen
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
 _REPORTING = ("log_every", "checkpoint_every")  # settings that do not affect weights
@@ -195,3 +195,34 @@ def _first_network(task: Task, scales: Scales) -> InteractionNetwork:
         )
     network = task.existing.network
     return widen(network, scales) if task.features != network.features else network
+
+
+def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:
+    """Return a network that also takes the place on the table; its output is equal.
+
+    The new features enter the first layer of f_dyn with weights of zero: they have no
+    effect until training changes that.
+
+    Args:
+        network: with the paper's features.
+        scales: of the new features, from the training data; the other features keep
+            their scales.
+    """
+    known, kept = network.features.body_size, network.scales
+    weight = network.dyn.weights[0]
+    added = scales.body_mean.shape[0] - known
+    silent = jnp.zeros((added, weight.shape[1]), weight.dtype)
+    # The features of the body come first, then the summed effects.
+    wider = jnp.concatenate([weight[:known], silent, weight[known:]])
+    dyn = eqx.tree_at(lambda layers: layers.weights[0], network.dyn, wider)
+    mean = jnp.concatenate([kept.body_mean, scales.body_mean[known:]])
+    deviation = jnp.concatenate([kept.body_deviation, scales.body_deviation[known:]])
+    widened = eqx.tree_at(
+        lambda s: (s.body_mean, s.body_deviation), kept, (mean, deviation)
+    )
+    features = FeatureSet((*network.features.blocks, Place()))
+    return eqx.tree_at(
+        lambda n: (n.rel, n.dyn, n.scales),
+        untrained(features, network.time_step, network.integrator),
+        (network.rel, dyn, widened),
+    )

@@ -1,4 +1,4 @@
-"""Model cards: metadata stored with the weights of a network."""
+"""Documents of models: cards of networks, and identified parameters."""
 
 from pathlib import Path
 from typing import Any, Literal
@@ -7,14 +7,14 @@ import msgspec
 
 from sainet.engines.simulator import InternalEngine
 from sainet.models.identity import ModelId
-from sainet.runs.documents import read_document
-from sainet.runs.errors import BadCheckpoint
+from sainet.runs.documents import read_document, read_json
+from sainet.runs.errors import BadCheckpoint, BadInput
+from sainet.runs.folders import CONFIG, remake
 from sainet.scenes.camera import AGREES, CameraOffset
-from sainet.scenes.quantities import TimeStep
+from sainet.scenes.quantities import Finite, Size, TimeStep
 
 CARD = "card.json"
 WEIGHTS = "network.safetensors"
-FORMAT = 2
 
 
 class Card(msgspec.Struct, frozen=True, kw_only=True):
@@ -35,7 +35,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     config: dict[str, Any]  # training settings
     manifest: dict[str, Any]  # versions, hardware, number of devices
     final_loss: float | None = None
-    format_version: Literal[2] = FORMAT
+    format_version: Literal[2] = 2
 
     def __post_init__(self) -> None:
         """Refuse identities that no network can have."""
@@ -69,3 +69,67 @@ def read_card(folder: Path) -> Card:
             "to resume it."
         )
     return read_document(path, Card, error=BadCheckpoint, remedy="train it again")
+
+
+IDENTIFIED = "identified.json"
+_INTERNAL = ("engine", "format_version")
+
+
+class Estimate(msgspec.Struct, frozen=True):
+    """Estimate of one parameter."""
+
+    name: str
+    value: Finite  # the initial value where the parameter is not identifiable
+    low: Finite  # of the 95 % interval
+    high: Finite
+    start: Finite  # initial value
+    doubt: str | None = None  # why the parameter is not identifiable, if so
+
+
+class Identified(msgspec.Struct, frozen=True, kw_only=True):
+    """Parameters estimated from pushes, and how much they improve the engine."""
+
+    engine: InternalEngine  # with the estimated parameters
+    estimates: tuple[Estimate, ...]
+    pushes: int
+    before_mm: Size  # mean position error where poses were observed
+    after_mm: Size
+    before_deg: Size  # mean rotation error
+    after_deg: Size
+    format_version: Literal[2] = 2
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the estimates as JSON values, sorted by name."""
+        found = msgspec.to_builtins(self, order="sorted") | {"values": self.values}
+        return {name: found[name] for name in sorted(found) if name not in _INTERNAL}
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The estimated values by the names of their parameters."""
+        pairs = sorted((estimate.name, estimate.value) for estimate in self.estimates)
+        return dict(pairs)
+
+
+def is_identified(folder: Path) -> bool:
+    """Return whether a folder is from `sainet identify`, finished or not."""
+    try:
+        if (folder / IDENTIFIED).is_file():
+            return True
+        return read_json(folder / CONFIG).get("command") == "identify"
+    except (BadInput, OSError):  # missing or damaged: reading it raises the error
+        return False
+
+
+def read_identified(folder: Path) -> Identified:
+    """Return the parameters that `sainet identify` estimated.
+
+    Raises:
+        BadInput: the file is missing, damaged or out of bounds.
+    """
+    path = folder / IDENTIFIED
+    if not path.is_file():
+        raise BadInput(
+            f"{path}: missing, so the identification is unfinished; run the same "
+            "'sainet identify' again."
+        )
+    return read_document(path, Identified, remedy=remake(folder))

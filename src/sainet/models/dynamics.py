@@ -8,8 +8,8 @@ import jax
 from jaxtyping import Array, Float
 
 from sainet.engines.base import AbstractEngine
-from sainet.models.correctors.base import AbstractCorrector, Purpose, Start
-from sainet.models.frame import push_frame
+from sainet.models.correctors import AbstractCorrector, Purpose, Start
+from sainet.models.inputs import push_frame
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, unpack_motion

@@ -5,7 +5,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from sainet.models.identified import Identified
+from sainet.models.card import Identified
 
 _HEADINGS = ("parameter", "before", "value", "95 % interval")
 

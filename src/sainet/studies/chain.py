@@ -16,8 +16,7 @@ from sainet.learning.fit import FitResult
 from sainet.learning.log import loss_note
 from sainet.learning.recipes import ModelKind, Recipe
 from sainet.models.identity import identity_named
-from sainet.models.library import PHYSICS, load_model
-from sainet.models.model import Model
+from sainet.models.library import PHYSICS, Model, load_model
 from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG

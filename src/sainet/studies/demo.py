@@ -15,7 +15,7 @@ from sainet.evaluation.evaluate import PAPER_STEPS
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import PAPER
-from sainet.models.model import Model
+from sainet.models.library import Model
 from sainet.report.episode_frames import outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report

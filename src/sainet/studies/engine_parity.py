@@ -17,7 +17,7 @@ from sainet.evaluation.joining import join
 from sainet.evaluation.summary import summarise
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
-from sainet.models.model import Model
+from sainet.models.library import Model
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene

@@ -18,13 +18,12 @@ from sainet.learning.recipes import (
     FromModel,
     ModelKind,
 )
-from sainet.models.camera import with_camera
+from sainet.models.card import read_identified
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
-from sainet.models.identified import read_identified
 from sainet.models.identity import identity_named
-from sainet.models.library import load_model, network_folder
-from sainet.models.model import Model
+from sainet.models.library import Model, load_model, network_folder
+from sainet.models.wrappers import with_camera
 from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
 from sainet.studies.trainings import scaled

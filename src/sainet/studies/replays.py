@@ -8,7 +8,7 @@ from jaxtyping import Float
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.models.dynamics import predict
-from sainet.models.model import Model
+from sainet.models.library import Model
 from sainet.report.replay import Replay, Track
 from sainet.scenes.state import State, Trajectory
 

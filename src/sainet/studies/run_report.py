@@ -7,9 +7,7 @@ from typing import Any
 import msgspec
 
 from sainet.control.record import episode_files, read_record
-from sainet.models.card import CARD, read_card
-from sainet.models.identified import FILE as IDENTIFIED
-from sainet.models.identified import Identified, read_identified
+from sainet.models.card import CARD, IDENTIFIED, Identified, read_card, read_identified
 from sainet.report.pages.page import REPORT, Report, to_page
 from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadInput

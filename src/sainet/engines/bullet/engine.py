@@ -1,24 +1,27 @@
 """Bullet behind the common interface of all engines."""
 
+import multiprocessing
 import sys
+from concurrent.futures import Executor
+from concurrent.futures.process import BrokenProcessPool
+from functools import lru_cache
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
 from sainet.engines.base import AbstractEngine
+from sainet.engines.bullet.world import Job, Moved, roll_jobs
 from sainet.runs.errors import BadScene, MissingExtra
+from sainet.runs.workers import core_count, spawned_pool, worker_lost
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
-if TYPE_CHECKING:
-    from sainet.engines.bullet.world import Job
-
 _NEWEST_PYTHON = (3, 11)  # with PyBullet wheels
-
+_FEW = 8  # pushes: up to here, one process is faster than several
+_SHARES = 4  # parts of the work per process, because processes differ in speed
 MOST_DISKS = 30  # one bit per disk in a collision mask of 31; all share the first bit
 
 
@@ -46,8 +49,6 @@ class BulletEngine(AbstractEngine):
         Raises:
             BadScene: the scene has more disks than Bullet has collision groups.
         """
-        from sainet.engines.bullet.pool import roll_everywhere
-
         if scene.body_count > MOST_DISKS:
             raise BadScene(
                 f"scene has {scene.body_count} disks; Bullet supports at most "
@@ -61,10 +62,8 @@ class BulletEngine(AbstractEngine):
         return Trajectory(unpack_motion(motion, pusher[..., 0:2], pusher[..., 2:4]))
 
 
-def _jobs(scene: Scene, initial: State, controls: Controls) -> list["Job"]:
+def _jobs(scene: Scene, initial: State, controls: Controls) -> list[Job]:
     """Return the numbers that define each push of a batch."""
-    from sainet.engines.bullet.world import Job
-
     axes = len(scene.batch_shape)
     arrays = _arrays(scene, initial, controls)
     rows = {
@@ -114,3 +113,32 @@ def _how_to_install() -> str:
             "the engine planar."
         )
     return "The engine bullet needs PyBullet: pip install 'sainet[bullet]'."
+
+
+def roll_everywhere(jobs: list[Job]) -> Moved:
+    """Return the motion of pushes simulated on all cores, byte-identical to one core.
+
+    In a worker process the pushes run in that process: the other workers use the
+    remaining cores.
+
+    Raises:
+        SainetError: a process was killed; the next call starts new processes.
+    """
+    if len(jobs) <= _FEW or multiprocessing.parent_process() is not None:
+        return roll_jobs(jobs)
+    size = -(-len(jobs) // (_SHARES * core_count()))
+    shares = [jobs[start : start + size] for start in range(0, len(jobs), size)]
+    try:
+        done = list(_pool().map(roll_jobs, shares))
+    except KeyboardInterrupt:
+        _pool.cache_clear()  # interrupted processes accept no more jobs
+        raise
+    except BrokenProcessPool:
+        _pool.cache_clear()
+        raise worker_lost() from None
+    return Moved(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+
+
+@lru_cache
+def _pool() -> Executor:
+    return spawned_pool(core_count())

@@ -13,9 +13,13 @@ from sainet.engines.planar.bodies import (
     to_properties,
     to_state,
 )
-from sainet.engines.planar.close_pairs import contact_budget, solve_close_pairs
-from sainet.engines.planar.solver import Step, solve_all_pairs
-from sainet.engines.planar.table import Twist
+from sainet.engines.planar.contact import Twist
+from sainet.engines.planar.solver import (
+    Step,
+    contact_budget,
+    solve_all_pairs,
+    solve_close_pairs,
+)
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory

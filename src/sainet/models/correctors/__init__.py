@@ -1,1 +1,61 @@
 """Correctors: they predict motion, with or without a simulator prediction."""
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from sainet.models.inputs import PushFrame
+from sainet.scenes.controls import Controls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
+
+
+class Start(eqx.Module):
+    """States at which a prediction starts or continues."""
+
+    predicted: State  # s-hat, fed back to the corrector
+    frame: PushFrame  # of the push, fixed since its start
+    simulated: State | None = None  # s-bar, fed back to the engine; None without one
+
+
+class Prediction(eqx.Module):
+    """A model prediction and its uncertainty."""
+
+    trajectory: Trajectory
+    # Standard deviation of poses (m, m, rad); None where the corrector has none.
+    deviation: Float[Array, "push time body 3"] | None = None
+
+
+class Purpose(NamedTuple):
+    """The pushes that a corrector is for."""
+
+    kind: str  # of the setup that makes the controls
+    time_step: float  # s
+
+
+class AbstractCorrector(eqx.Module):
+    """Predicts pushes by correcting a simulator prediction, or without one."""
+
+    @property
+    @abstractmethod
+    def made_for(self) -> Purpose:
+        """The pushes that the corrector is for."""
+
+    @abstractmethod
+    def correct(
+        self,
+        scene: Scene,
+        start: Start,
+        controls: Controls,
+        simulated: Trajectory | None,
+    ) -> Prediction:
+        """Predict the states after each step of the controls.
+
+        Args:
+            scene: of each push.
+            start: of each push.
+            controls: of each push, in the table frame.
+            simulated: simulator prediction, in the table frame; None without an engine.
+        """

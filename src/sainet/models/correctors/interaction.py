@@ -12,25 +12,30 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from sainet.models.bounded import bound_gradient
-from sainet.models.correctors.base import (
+from sainet.models.correctors import (
     AbstractCorrector,
     Prediction,
     Purpose,
     Start,
 )
 from sainet.models.features import FeatureSet
-from sainet.models.frame import motion_from_frame, motion_to_frame
 from sainet.models.inputs import (
     Drive,
     Moment,
     Still,
     drives,
     in_columns,
+    motion_from_frame,
+    motion_to_frame,
     near_pairs,
     still_features,
 )
-from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
+from sainet.models.integrators import (
+    Acceleration,
+    Integrator,
+    RelaxingResidual,
+    bound_gradient,
+)
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import Trajectory, pack_motion, unpack_motion

@@ -1,13 +1,59 @@
-"""Pushes cut into single steps: training data of the non-recurrent form."""
+"""Batches as training uses them: some mirrored, or cut into single steps."""
+
+from dataclasses import replace
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array
+import numpy as np
+from jaxtyping import Array, Bool
 
 from sainet.datasets.batch import PushBatch
 from sainet.engines.base import AbstractEngine
 from sainet.scenes.state import State, pack_motion, unpack_motion
+
+_STREAM = 0x318808
+_POSE = (1.0, -1.0, -1.0)
+
+
+def mirror_some(batch: PushBatch, seed: int, iteration: int) -> PushBatch:
+    """Return the batch with about half of its pushes mirrored; drawn by the iteration.
+
+    Scenes stay: a stored push has no field of friction.
+    """
+    rng = np.random.default_rng([_STREAM, seed, iteration])
+    return mirror(batch, jnp.asarray(rng.random(batch.size) < 1 / 2))
+
+
+def mirror(batch: PushBatch, chosen: Bool[Array, " push"]) -> PushBatch:
+    """Return the batch with the chosen pushes mirrored at the x axis of the table."""
+
+    def flip(values: Array) -> Array:
+        poses = np.resize(_POSE, values.shape[-1])  # and their rates, if packed motion
+        return values * poses.astype(values.dtype).reshape(
+            (1,) * (values.ndim - 1) + (-1,)
+        )
+
+    def choose(mirrored: Array, values: Array) -> Array:
+        return jnp.where(chosen.reshape(-1, *[1] * (values.ndim - 1)), mirrored, values)
+
+    known = batch.initial, batch.controls, batch.truth, batch.measured, batch.simulated
+    mirrored = (
+        batch.initial.mirrored(),
+        batch.controls.mirrored(),
+        *jax.tree.map(flip, known[2:]),
+    )
+    initial, controls, truth, measured, simulated = jax.tree.map(
+        choose, mirrored, known
+    )
+    return replace(
+        batch,
+        initial=initial,
+        controls=controls,
+        truth=truth,
+        measured=measured,
+        simulated=simulated,
+    )
 
 
 @eqx.filter_jit
