@@ -18,7 +18,8 @@ from contracts.worlds import far_away, make_scene, moving, pushed, rows
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
-from sainet.engines.bullet import pool, world
+from sainet.engines.bullet import engine as bullet
+from sainet.engines.bullet import world
 from sainet.runs.errors import BadScene, MissingExtra, SainetError
 from sainet.scenes.scene import GRAVITY, FrictionField
 from support import require
@@ -59,7 +60,7 @@ def test_worker_processes_give_identical_results():
 def test_a_killed_process_is_reported_and_replaced():
     many = pushed(GenerateConfig(disks=1, pushes=9), 3, 2)
     before = roll_out(make_engine("bullet"), *many).states
-    wait([pool._pool().submit(os._exit, 1)])
+    wait([bullet._pool().submit(os._exit, 1)])
     with pytest.raises(SainetError, match="a worker process was killed"):
         roll_out(make_engine("bullet"), *many)
     assert same_bits(roll_out(make_engine("bullet"), *many).states, before)
