@@ -16,7 +16,7 @@ from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.identification import intervals as intervals_module
+from sainet.identification import residuals as intervals_module
 from sainet.identification.identify import identify, identify_into
 from sainet.identification.parameters import (
     doubt,
