@@ -1,11 +1,9 @@
 """Summaries as the JSON objects that commands print with ``--json``."""
 
-from typing import Any
-
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 
-Json = dict[str, Any]
+Json = dict[str, object]
 
 
 def to_json_object(summary: Summary) -> Json:
@@ -67,8 +65,12 @@ def _ends(estimate: Estimate) -> list[float | None]:
 
 def _published(summary: Summary) -> list[Json]:
     return [
-        {"model": each.model.slug, "body": body + 1, "group": each.condition or None}
-        | {metric: values[body] for metric, values in each.values.items()}
+        {
+            "model": each.model.slug,
+            "body": body + 1,
+            "group": each.condition or None,
+            **{metric: values[body] for metric, values in each.values.items()},
+        }
         for each in summary.published
         for body in range(len(next(iter(each.values.values()))))
     ]

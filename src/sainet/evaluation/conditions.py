@@ -1,10 +1,9 @@
 """Conditions, published values and provenance: the header of measurements."""
 
-from typing import Any
-
 import msgspec
 
 from sainet.models.identity import ModelId
+from sainet.runs.manifest import Manifest
 
 FORMAT_VERSION = 1
 
@@ -43,7 +42,7 @@ class TestSet(msgspec.Struct, frozen=True, kw_only=True):
 
     condition: str
     data: str = ""  # hash of the dataset
-    settings: dict[str, Any] = {}  # that made it
+    settings: dict[str, object] = {}  # that made it
 
 
 class Provenance(msgspec.Struct, frozen=True, kw_only=True):
@@ -53,7 +52,7 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True):
     note: str = ""  # anything a reader has to be told of their origin
     tests: tuple[TestSet, ...] = ()
     trainings: tuple[Training, ...] = ()
-    manifest: dict[str, Any] = {}  # versions, commit, hardware
+    manifest: Manifest | None = None
 
 
 class Header(msgspec.Struct, frozen=True, kw_only=True):

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -34,7 +33,7 @@ class TrialRow(msgspec.Struct, frozen=True, kw_only=True):
     median_final_mm: float | None
     ended_early: int  # the measured pose was within the tolerance, the true one not
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, object]:
         """Return everything but condition and model as JSON values."""
         found = msgspec.structs.asdict(self) | {"interval": list(self.interval)}
         return {k: v for k, v in found.items() if k not in ("condition", "model")}

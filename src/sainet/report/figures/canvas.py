@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypedDict
 
 import matplotlib
 import numpy as np
@@ -71,10 +71,25 @@ def save(figure: Figure, path: Path) -> Path:
     return path
 
 
-def line_look(style: ModelStyle, width: float = 1.6) -> dict[str, Any]:
-    """Return Matplotlib's keywords for the line of a model (points)."""
-    dashes = {"dashes": style.dash, "dash_capstyle": "butt"} if style.dash else {}
-    return {"color": style.color, "linewidth": width, **dashes}
+class LineLook(TypedDict, total=False):
+    """Matplotlib's keywords for a line; lengths in points."""
+
+    color: str
+    linewidth: float
+    alpha: float
+    linestyle: Literal[":"]
+    dashes: tuple[float, ...]
+    dash_capstyle: Literal["butt"]
+    marker: str
+    markersize: float
+
+
+def line_look(style: ModelStyle, width: float = 1.6) -> LineLook:
+    """Return the look of the line of a model."""
+    look = LineLook(color=style.color, linewidth=width)
+    if style.dash:
+        look |= LineLook(dashes=style.dash, dash_capstyle="butt")
+    return look
 
 
 def add_grid(axes: Axes, axis: str = "y") -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -12,6 +11,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from scipy.ndimage import uniform_filter1d
 
 from sainet.report.figures.canvas import (
+    LineLook,
     add_grid,
     house_look,
     label_ends,
@@ -24,9 +24,9 @@ History = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 _WINDOW = 0.1  # fraction of the logged losses in a mean
 # The style of each kind of line.
-_BATCH: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.45}
-_MEAN: dict[str, Any] = {"linewidth": 1.6}
-_VALIDATION: dict[str, Any] = {"linestyle": ":", "marker": "o", "markersize": 3}
+_BATCH = LineLook(linewidth=0.7, alpha=0.45)
+_MEAN = LineLook(linewidth=1.6)
+_VALIDATION = LineLook(linestyle=":", marker="o", markersize=3)
 
 
 def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
@@ -67,16 +67,19 @@ def running_mean(losses: Float[np.ndarray, " logged"]) -> Float[np.ndarray, " lo
 
 def _draw_history(axes: Axes, style: ModelStyle, history: History) -> None:
     iterations, training, checked, validation = map(np.asarray, history)
-    axes.plot(iterations, training, color=style.color, **_BATCH)
-    axes.plot(iterations, running_mean(training), color=style.color, **_MEAN)
-    axes.plot(checked, validation, color=style.color, **_VALIDATION)
+    axes.plot(iterations, training, **_BATCH | {"color": style.color})
+    axes.plot(iterations, running_mean(training), **_MEAN | {"color": style.color})
+    axes.plot(checked, validation, **_VALIDATION | {"color": style.color})
 
 
 def _explain_lines(axes: Axes, histories: Mapping[str, History]) -> None:
     kinds = {"training, each batch": _BATCH, "training, running mean": _MEAN}
     if any(len(validation) for *_, validation in histories.values()):
         kinds["validation"] = _VALIDATION
-    handles = [Line2D([], [], color=INK, label=name, **kinds[name]) for name in kinds]
+    handles = [
+        Line2D([], [], label=name, **look | {"color": INK})
+        for name, look in kinds.items()
+    ]
     axes.legend(handles=handles, loc="upper right")
 
 

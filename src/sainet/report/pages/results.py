@@ -116,12 +116,10 @@ def origin(summary: Summary) -> str:
     """Return the command, the note and the machine of a summary, in a paragraph."""
     source = summary.provenance
     words = " ".join(source.command)
-    versions = source.manifest.get("versions", {})
-    machine = source.manifest.get("processor", "")
     parts = [f"`{words}`." if words else "", source.note]
-    if machine:
-        known = ", ".join(f"{k} {v}" for k, v in versions.items() if v)
-        parts.append(f"Machine: {machine}, {source.manifest['cores']} cores; {known}.")
+    if machine := source.manifest:
+        known = ", ".join(f"{k} {v}" for k, v in machine.versions.items() if v)
+        parts.append(f"Machine: {machine.processor}, {machine.cores} cores; {known}.")
     return " ".join(part for part in parts if part)
 
 
