@@ -7,7 +7,7 @@ from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.datasets.splits import fold_of_push, make_folds
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.evaluate import evaluate
-from sainet.evaluation.folds import join_folds
+from sainet.evaluation.joining import join_folds
 from sainet.evaluation.summary import summarise
 from sainet.models.library import load_model
 

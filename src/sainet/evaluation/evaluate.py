@@ -1,6 +1,7 @@
 """Several models on the same stored pushes, side by side."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
@@ -46,12 +47,12 @@ def evaluate(
         store: the pushes.
         steps: to predict; 0 is all, None the paper's 200 (recorded pushes: all).
         force: use networks on other pushes than they were trained for.
-        on_pushes: told the model and how many pushes were predicted.
+        on_pushes: called with the model and the number of pushes predicted since.
 
     Raises:
         BadCheckpoint: a network does not fit the pushes.
         BadInput: two models have the same name.
-        Diverged: a prediction left the finite numbers.
+        Diverged: a prediction is not finite.
     """
     names = [model.name for model in models]
     if len(set(names)) < len(names):
@@ -76,25 +77,57 @@ def evaluate(
     return _measurements(models, store, arrays, errors, parts)
 
 
-def predict_ends(
-    model: Model, store: Store
-) -> tuple[Float[np.ndarray, "push body 3"], Float[np.ndarray, "push body 3"]]:
-    """Return predicted and observed poses (m, rad) at the last observed steps.
+@dataclass(frozen=True)
+class EndOffsets:
+    """Signed errors of a model at the ends of pushes, of the pushed disk."""
+
+    place: Float[np.ndarray, "push 2"]  # m, of the disk before the push
+    heading: Float[np.ndarray, " push"]  # rad, of the push on the table
+    offset: Float[np.ndarray, "push 2"]  # m, observed minus predicted, on the table
+    turn: Float[np.ndarray, " push"]  # rad, likewise
+
+    @property
+    def along(self) -> Float[np.ndarray, " push"]:
+        """The offset along the push (m)."""
+        return np.sum(self.offset * self._ahead, axis=-1)
+
+    @property
+    def across(self) -> Float[np.ndarray, " push"]:
+        """The offset to the left of the push (m)."""
+        x, y = self._ahead.T
+        return self.offset[:, 1] * x - self.offset[:, 0] * y
+
+    @property
+    def _ahead(self) -> Float[np.ndarray, "push 2"]:
+        return np.column_stack([np.cos(self.heading), np.sin(self.heading)])
+
+
+def end_offsets(model: Model, store: Store) -> EndOffsets:
+    """Predict every push along a path and return the signed errors of its end.
 
     Args:
         model: predicts.
-        store: of pushes that were observed at their ends at least; NaN otherwise.
+        store: of pushes along paths, observed at least at their ends; NaN otherwise.
     """
     arrays = _read(store)
     parts = list(_parts_of_one_length(arrays, store.info.steps))
     poses = _predict_all(model, store, arrays, parts, lambda name, pushes: None)
     order = np.argsort(np.concatenate([part for part, _ in parts]))
-    truths = [_truth(arrays, part, steps) for part, steps in parts]
-    predicted = [
-        final_pose(pose, seen) for pose, (_, seen) in zip(poses, truths, strict=True)
-    ]
-    observed = [final_pose(*truth) for truth in truths]
-    return np.concatenate(predicted)[order], np.concatenate(observed)[order]
+    missed = np.concatenate(
+        [
+            (final_pose(*truth) - final_pose(pose, truth[1]))[:, 0]
+            for pose, (part, steps) in zip(poses, parts, strict=True)
+            for truth in [_truth(arrays, part, steps)]
+        ]
+    )[order]
+    last = arrays["command_position"][np.arange(len(order)), arrays["steps"] - 1]
+    stroke = (last - arrays["initial_pusher"]).astype(np.float64)
+    return EndOffsets(
+        place=arrays["initial"][:, 0, :2].astype(np.float64),
+        heading=np.arctan2(stroke[:, 1], stroke[:, 0]),
+        offset=missed[:, :2],
+        turn=np.mod(missed[:, 2] + np.pi, 2 * np.pi) - np.pi,
+    )
 
 
 def _read(store: Store) -> dict[str, np.ndarray]:
@@ -160,9 +193,9 @@ def _check_finite(
     lost = part[~np.isfinite(poses).all(axis=(1, 2, 3))]
     if len(lost):
         raise Diverged(
-            f"{model.name}: what it predicts of push {lost[0]} of {store.path} is not "
-            f"finite, nor of {len(lost) - 1} more of {len(part)}; leave it out, or "
-            "train it again."
+            f"{model.name}: its prediction of push {lost[0]} of {store.path} is not "
+            f"finite, nor are {len(lost) - 1} more of {len(part)}; leave the model "
+            "out, or train it again."
         )
 
 

@@ -4,17 +4,19 @@ All keep the order of models, conditions and samples: outer joins would sort the
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, TypeVar
+from typing import TypeVar
 
-import msgspec
 import numpy as np
 import xarray as xr
+from msgspec.structs import replace
 
-from sainet.evaluation.conditions import Condition, Header, Provenance
+from sainet.datasets.splits import Fold
+from sainet.evaluation.conditions import Header
 from sainet.evaluation.measurements import PUSHES, Measurements
 from sainet.models.identity import ModelId
 
 T = TypeVar("T")
+_PADDED = ("training", "body", "decision")  # dimensions that parts may have less of
 
 
 def pool_trainings(
@@ -44,80 +46,63 @@ def pool_trainings(
         {name: (PUSHES, pooled(measured.data[name].values)) for name in names}
     )
     models = tuple(identity for identity, _ in runs_of)
-    return Measurements(data, _replace(measured.header, models=models))
+    return Measurements(data, replace(measured.header, models=models))
 
 
 def join(parts: Sequence[Measurements]) -> Measurements:
     """Return the samples of all parts, one after another: conditions, or folds."""
-    models = _distinct(model for part in parts for model in part.header.models)
-    conditions = _distinct(c for part in parts for c in part.header.conditions)
-    slugs = [model.slug for model in models]
-    labels = [condition.label for condition in conditions]
-    sizes = {
-        name: max(part.data.sizes.get(name, 0) for part in parts)
-        for name in ("training", "body", "decision")
-    } | {"model": len(models)}
-    names = dict.fromkeys(str(name) for part in parts for name in part.data.variables)
-    found: dict[str, tuple[Any, np.ndarray]] = {}
-    for name in names:
-        dims = next(p.data[name].dims for p in parts if name in p.data.variables)
-        values = [_widened(part, name, dims, slugs, sizes) for part in parts]
-        if name == "condition":
-            values = [
-                np.array([labels.index(c.label) for c in part.header.conditions])[place]
-                for part, place in zip(parts, values, strict=True)
-            ]
-        if dims == ("sample",):
-            values = [each.astype(np.int32) for each in values]
-        axis = dims.index("sample")
-        found[name] = dims, np.concatenate(values, axis=axis)
-    data = xr.Dataset(found).set_coords(["condition", "fold", "row"])
-    return Measurements(data, _joined_header(parts, models, conditions))
+    header = _joined_header([part.header for part in parts])
+    slugs = [model.slug for model in header.models]
+    labels = [condition.label for condition in header.conditions]
+    padded = [
+        each.assign_coords(model=part.slugs).reindex(model=slugs)
+        for part, each in zip(parts, _padded(parts), strict=True)
+    ]
+    places = [
+        np.array([labels.index(c.label) for c in part.header.conditions])[
+            part.data["condition"].values
+        ]
+        for part in parts
+    ]
+    data = xr.concat(
+        padded, "sample", data_vars="minimal", coords="minimal", compat="override"
+    )
+    data = data.drop_vars(["model", *_PADDED], errors="ignore")
+    return Measurements(
+        data.assign_coords(
+            condition=("sample", np.concatenate(places).astype(np.int32))
+        ),
+        header,
+    )
 
 
-def _widened(
-    part: Measurements,
-    name: str,
-    dims: tuple[Any, ...],
-    slugs: Sequence[str],
-    sizes: Mapping[str, int],
-) -> np.ndarray:
-    """Return one variable of a part, padded with NaN to all models and bodies."""
-    samples = part.data.sizes["sample"]
-    if dims == ("sample",):
-        return part.data[name].values
-    wide = np.full([sizes.get(str(dim), samples) for dim in dims], np.nan)
-    if name not in part.data:
-        return wide
-    values = part.data[name].values
-    place: list[Any] = [slice(size) for size in values.shape]
-    if "model" in dims:
-        place[0] = [slugs.index(slug) for slug in part.slugs]
-    wide[tuple(place)] = values
-    return wide
+def join_folds(parts: Sequence[tuple[Fold, Measurements]]) -> Measurements:
+    """Return the measurements of all pushes, each by models not trained on it.
+
+    Args:
+        parts: of every fold, with the same models in each; together their tests are
+            all pushes of interest, each once.
+    """
+    rows = np.concatenate([fold.rows for fold, _ in parts]).astype(np.int32)
+    numbers = [np.full(len(fold.rows), fold.number, np.int32) for fold, _ in parts]
+    whole = join([measured for _, measured in parts])
+    data = whole.data.assign_coords(
+        fold=("sample", np.concatenate(numbers)), row=("sample", rows)
+    )
+    return Measurements(data.isel(sample=np.argsort(rows)), whole.header)
 
 
 def add_models(measured: Measurements, other: Measurements) -> Measurements:
     """Return measurements with the models of others, of the very same samples."""
     names = measured.error_names
-    most = max(measured.data.sizes["training"], other.data.sizes["training"])
-
-    def padded(values: np.ndarray) -> np.ndarray:
-        width = [(0, 0)] * 4
-        width[1] = 0, most - values.shape[1]
-        return np.pad(values, width, constant_values=np.nan)
-
-    both = {
-        name: np.concatenate(
-            [padded(one.data[name].values) for one in (measured, other)]
-        )
-        for name in names
-    }
-    data = measured.data.drop_vars(names).assign(
-        {name: (PUSHES, values) for name, values in both.items()}
-    )
+    ours, theirs = (each[names] for each in _padded([measured, other]))
+    errors = xr.concat([ours, theirs], "model", join="exact", compat="equals")
+    errors = errors.drop_vars(_PADDED, errors="ignore")
     models = (*measured.header.models, *other.header.models)
-    return Measurements(data, _replace(measured.header, models=models))
+    return Measurements(
+        measured.data.drop_vars(names).assign(errors.data_vars),
+        replace(measured.header, models=models),
+    )
 
 
 def without_predictions(measured: Measurements) -> Measurements:
@@ -126,30 +111,34 @@ def without_predictions(measured: Measurements) -> Measurements:
     kept = [n for n, m in enumerate(header.models) if m.slug not in header.predictions]
     models = tuple(header.models[number] for number in kept)
     return Measurements(
-        measured.data.isel(model=kept), _replace(header, models=models, predictions=())
+        measured.data.isel(model=kept), replace(header, models=models, predictions=())
     )
 
 
-def _joined_header(
-    parts: Sequence[Measurements],
-    models: tuple[ModelId, ...],
-    conditions: tuple[Condition, ...],
-) -> Header:
-    headers = [part.header for part in parts]
-    sources = [header.provenance for header in headers]
-    first = headers[0]
-    return _replace(
+def _padded(parts: Sequence[Measurements]) -> list[xr.Dataset]:
+    """Return the data of all parts, padded with NaN to one size but for samples."""
+    sizes = [{k: part.data.sizes.get(k, 0) for k in _PADDED} for part in parts]
+    padded: list[xr.Dataset] = []
+    for part, known in zip(parts, sizes, strict=True):
+        present = [name for name in _PADDED if known[name]]
+        numbered = part.data.assign_coords({k: np.arange(known[k]) for k in present})
+        widest = {k: np.arange(max(size[k] for size in sizes)) for k in present}
+        padded.append(numbered.reindex(widest))
+    return padded
+
+
+def _joined_header(headers: Sequence[Header]) -> Header:
+    first, sources = headers[0], [header.provenance for header in headers]
+    return replace(
         first,
-        models=models,
-        conditions=conditions,
+        models=_distinct(model for header in headers for model in header.models),
+        conditions=_distinct(c for header in headers for c in header.conditions),
         published=_distinct(each for header in headers for each in header.published),
         predictions=_distinct(slug for h in headers for slug in h.predictions),
-        provenance=Provenance(
-            command=first.provenance.command,
-            note=first.provenance.note,
+        provenance=replace(
+            first.provenance,
             tests=_distinct(test for source in sources for test in source.tests),
             trainings=_distinct(run for each in sources for run in each.trainings),
-            manifest=first.provenance.manifest,
         ),
     )
 
@@ -161,7 +150,3 @@ def _distinct(values: Iterable[T]) -> tuple[T, ...]:
         if value not in found:
             found.append(value)
     return tuple(found)
-
-
-def _replace(header: Header, **changes: Any) -> Header:  # noqa: ANN401
-    return msgspec.structs.replace(header, **changes)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -101,15 +100,15 @@ def summarise(measured: Measurements, *, subject: str = "") -> Summary:
             model is compared with every other.
     """
     header = measured.header
-    shared = {
-        "models": header.models,
-        "conditions": header.conditions,
-        "published": header.published,
-        "provenance": header.provenance,
-    }
+    found = Summary(
+        models=header.models,
+        conditions=header.conditions,
+        published=header.published,
+        provenance=header.provenance,
+    )
     if measured.is_of_trials:
-        return Summary(
-            **shared, trials=trial_rows(measured), tests=compare_trials(measured)
+        return msgspec.structs.replace(
+            found, trials=trial_rows(measured), tests=compare_trials(measured)
         )
     rows: list[Row] = []
     predictions: list[Row] = []
@@ -132,8 +131,8 @@ def summarise(measured: Measurements, *, subject: str = "") -> Summary:
         for each in part.compare(one, other)
         if not (subject and part.has_only_ends) or METRICS[each.metric].is_of_end
     ]
-    return Summary(
-        **shared,
+    return msgspec.structs.replace(
+        found,
         rows=tuple(rows),
         predictions=tuple(predictions),
         comparisons=tuple(compared),
@@ -221,7 +220,7 @@ class _Part:
         for metric in MEASURED:
             found = one[metric].minus(other[metric])
             if not np.isfinite(found[0]).any():
-                continue  # unknown of both
+                continue  # not measured for either
             for body in range(self.bodies):
                 yield Comparison(
                     condition=self.condition.label,
@@ -284,17 +283,3 @@ def _estimate(found: Interval, body: int, *, with_interval: bool = True) -> Esti
 def _number(value: float) -> float | None:
     """Return a number that JSON can hold; None where it is unknown."""
     return float(value) if math.isfinite(value) else None
-
-
-def join_summaries(parts: Sequence[Summary]) -> Summary:
-    """Return one summary of the conditions of several."""
-    first = parts[0]
-
-    def joined(name: str) -> Any:  # noqa: ANN401
-        found: list[Any] = []
-        for part in parts:
-            found += [each for each in getattr(part, name) if each not in found]
-        return tuple(found)
-
-    names = [name for name in Summary.__struct_fields__ if name != "provenance"]
-    return Summary(**{n: joined(n) for n in names}, provenance=first.provenance)

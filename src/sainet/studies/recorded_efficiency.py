@@ -8,8 +8,7 @@ import numpy as np
 
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
-from sainet.evaluation.folds import join_folds
-from sainet.evaluation.joining import join
+from sainet.evaluation.joining import join, join_folds
 from sainet.evaluation.summary import summarise
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.chain import Chain

@@ -15,10 +15,14 @@ import numpy as np
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
 from sainet.evaluation.conditions import Condition
-from sainet.evaluation.folds import join_folds
-from sainet.evaluation.joining import add_models, join, without_predictions
+from sainet.evaluation.evaluate import EndOffsets, end_offsets
+from sainet.evaluation.joining import (
+    add_models,
+    join,
+    join_folds,
+    without_predictions,
+)
 from sainet.evaluation.measurements import Measurements
-from sainet.evaluation.offsets import EndOffsets, end_offsets
 from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import Features, ModelKind
 from sainet.models.identity import identity_named

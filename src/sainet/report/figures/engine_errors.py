@@ -11,7 +11,7 @@ from sainet.report.figures.canvas import add_grid, house_look, new_figure, save
 from sainet.report.palette import INK, MOVED, PUSHED
 
 if TYPE_CHECKING:
-    from sainet.evaluation.offsets import EndOffsets
+    from sainet.evaluation.evaluate import EndOffsets
 
 _CELL = 20.0  # mm, of the table
 _FEWEST = 4  # pushes of a mean that is drawn
