@@ -183,7 +183,7 @@ def test_rows_of_one_push_have_no_interval_and_unknown_is_none():
 
 def test_intervals_cover_the_mean_about_95_times_in_100():
     rng = np.random.default_rng(1)
-    values = rng.normal(3, 2, (80, 300))  # 300 experiments of 80 pushes
+    values = rng.normal(3, 2, (80, 300))  # 300 samples of 80 pushes
     mean, low, high = Sample(values).interval
     np.testing.assert_allclose(mean, values.mean(0))
     covered = ((low < 3) & (high > 3)).mean()

@@ -13,9 +13,9 @@ from sainet.cli.output import Output
 from sainet.cli.reproduce import Reproduce
 from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
-from sainet.studies import EXPERIMENTS, load_experiment
-from sainet.studies.published import ROBOT_TWO_DISKS
-from sainet.studies.result import Result
+from sainet.studies import STUDIES, load_study
+from sainet.studies.published import PUBLISHED_ROBOT_TWO_DISKS
+from sainet.studies.study import Result, Study
 from support import SOURCE
 
 TINY = ("--pushes", "100", "--test-pushes", "6", "--iterations", "2")
@@ -58,8 +58,9 @@ def test_the_report_of_the_demo_plays(demo, chromium):
 
 def test_an_unknown_study_lists_the_available_studies():
     with pytest.raises(UnknownName, match="robot-planar"):
-        load_experiment("table-9")
-    assert all(callable(load_experiment(name)) for name in EXPERIMENTS)
+        load_study("table-9")
+    for name in STUDIES:
+        assert load_study(name).question.endswith("?")
 
 
 NOTHING = Result(summary=Summary(models=()))
@@ -67,13 +68,11 @@ NOTHING = Result(summary=Summary(models=()))
 
 @pytest.fixture
 def begun(monkeypatch):
-    """The folders of the experiments that were begun; those below do nothing."""
+    """The folders of the studies that were run, which do nothing."""
     folders = []
-    for name in ("robot_planar", "fine_tuning"):
-        monkeypatch.setattr(
-            f"sainet.studies.{name}.run",
-            lambda scale, chain: folders.append(chain.out.name) or NOTHING,
-        )
+    monkeypatch.setattr(
+        Study, "run", lambda self, scope, runner, out: folders.append(out) or NOTHING
+    )
     monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
     return folders
 
@@ -91,35 +90,39 @@ def test_missing_requirements_are_reported_before_any_run(
 ):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(error, match=says):
-        Reproduce(experiments=("robot-planar", second)).run()
+        Reproduce(studies=("robot-planar", second)).run()
     assert begun == []
 
 
 def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    Reproduce(output=Output(quiet=True)).run()
-    assert begun == ["robot-planar-quick", "fine-tuning-quick"]
-    recorded, bullet = capsys.readouterr().err.splitlines()
-    told = "recorded-pushes, recorded-data-efficiency."
-    assert recorded == f"Left out without --recorded: {told}"
-    assert bullet.startswith("Left out without PyBullet (Python 3.11 only): direct-")
+    found = json.loads(json.dumps(Reproduce(output=Output(quiet=True)).run()))
+    not_run = found["not_run"]
+    assert found["studies"].keys() == {"robot-planar", "fine-tuning"}
+    folders = [folder.name for folder in begun]
+    assert folders == ["robot-planar-quick", "fine-tuning-quick"]
+    lines = capsys.readouterr().err.splitlines()
+    assert {line.partition(" is not run: ")[0] for line in lines} == not_run.keys()
+    assert not_run.keys() == set(STUDIES) - {"robot-planar", "fine-tuning"}
+    assert not_run["recorded-pushes"].startswith("--recorded is missing: give")
+    assert "PyBullet" in not_run["engine-parity"]
 
 
 def test_parallel_training_is_refused_on_one_gpu(begun, monkeypatch):
     monkeypatch.setattr("jax.default_backend", lambda: "gpu")
     with pytest.raises(BadInput, match="--trainers is 2; on a GPU it must be 1"):
-        Reproduce(experiments=("robot-planar",), trainers=2).run()
+        Reproduce(studies=("robot-planar",), trainers=2).run()
     assert begun == []
-    Reproduce(experiments=("robot-planar",)).run()
-    assert begun == ["robot-planar-quick"]
+    Reproduce(studies=("robot-planar",)).run()
+    assert [folder.name for folder in begun] == ["robot-planar-quick"]
 
 
 def test_the_help_names_every_study():
     source = (SOURCE / "cli" / "reproduce.py").read_text("utf-8")
-    assert all(name in source for name in EXPERIMENTS)
+    assert all(name in source for name in STUDIES)
 
 
 def test_published_values_are_the_papers():
-    (sain,) = (each for each in ROBOT_TWO_DISKS if each.model.slug == "sain")
+    (sain,) = (each for each in PUBLISHED_ROBOT_TWO_DISKS if each.model.slug == "sain")
     second = {metric: values[1] for metric, values in sain.values.items()}
     assert second == {"trans_percent": 1.50, "pos_mm": 3.47, "rot_deg": 0.21}

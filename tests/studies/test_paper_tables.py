@@ -1,5 +1,6 @@
 """Tiny studies with Bullet: their rows and their shared datasets and networks."""
 
+from collections import Counter
 from importlib.util import find_spec
 
 import numpy as np
@@ -10,10 +11,11 @@ from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.models.card import read_card
 from sainet.runs.documents import read_json
 from sainet.studies.data_efficiency import AGAIN_CONDITION, IN_FULL
-from sainet.studies.paper_setup import AROUND, BYSTANDER, NETWORKS
-from sainet.studies.published import DIRECT_FORCE_THREE_DISKS
-from sainet.studies.regularisation import score
+from sainet.studies.paper_setup import NETWORKS
+from sainet.studies.published import PUBLISHED_DIRECT_FORCE_THREE_DISKS
 from sainet.studies.robustness import push_angles
+from sainet.studies.study import STEPS
+from sainet.studies.variants import score
 from support import require
 
 pytestmark = pytest.mark.slow
@@ -29,6 +31,10 @@ def cards(folder):
     return {path: path.stat().st_mtime_ns for path in folder.rglob("card.json")}
 
 
+def without_hash(card):
+    return card.parent.name.rpartition("-")[0]
+
+
 def rows_of(table):
     return {(row["group"], row["model"], row["body"]) for row in table["rows"]}
 
@@ -40,21 +46,19 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
     assert len(made) == len(NETWORKS)
     after = cards(tmp_path)
     assert {path: after[path] for path in made} == made
-    beside = {f"sain-{BYSTANDER}"}
-    added = {path.parent.name for path in after.keys() - made.keys()}
-    assert added == {f"{name}-seed-0" for name in beside}
+    beside, usual = {"sain-bystander"}, {network.slug for network in NETWORKS}
+    added = after.keys() - made.keys()
+    assert {without_hash(path) for path in added} == {"sain-bystander-seed-0"}
     for disks, table, more in (
         (2, two, set()),
         (3, three, beside),
         (2, three["as_trained"], beside),
     ):
-        models, bodies = PHYSICS | set(NETWORKS) | more, range(1, disks + 1)
+        models, bodies = PHYSICS | usual | more, range(1, disks + 1)
         assert rows_of(table) == {(None, m, b) for m in models for b in bodies}
         assert all(row["n"] == 4 for row in table["rows"])
-    old, new = (
-        read_json(tmp_path / "direct-force-quick" / f"{name}-seed-0" / "card.json")
-        for name in ("sain", *beside)
-    )
+    (old,) = (path for path in made if without_hash(path) == "sain-seed-0")
+    old, new = map(read_json, (old, *added))
     assert new["started_from"] == old["weights"]
     assert new["identity"] == old["identity"]
     published = {row["model"]: [] for row in three["published"]}
@@ -62,20 +66,20 @@ def test_tables_of_one_setup_share_data_and_networks(make, tmp_path):
         published[row["model"]].append(row["pos_mm"])
     assert published == {
         each.model.slug: list(each.values["pos_mm"])
-        for each in DIRECT_FORCE_THREE_DISKS
+        for each in PUBLISHED_DIRECT_FORCE_THREE_DISKS
     }
     made_by = read_json(tmp_path / "direct-force-three-disks" / "config.json")
-    assert made_by["experiment"] == "direct-force-three-disks"
+    assert made_by["study"] == "direct-force-three-disks"
     versions = read_json(tmp_path / "direct-force-three-disks" / "manifest.json")
     assert versions["versions"]["jax"]
     engines = {
         internal.simulator.slug if internal else None
         for internal in (read_card(path.parent).internal for path in made)
     }
-    assert engines == {None, *AROUND.values()}
+    assert engines == {None, "bullet", "planar", "planar-true"}
 
 
-def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
+def test_studies_of_the_robot_setup_share_networks(make, tmp_path):
     models = PHYSICS | {"in"}
     efficiency = make("data-efficiency")
     assert rows_of(efficiency) == {
@@ -96,15 +100,18 @@ def test_experiments_of_the_robot_setup_share_networks(make, tmp_path):
     groups = {row["group"] for row in robust["rows"]}
     assert len(groups) == 8
     assert groups >= {"as trained", "properties ±10 %", "angles outside", "2 mm apart"}
-    forms = ("", "-3-pushes", "-6-pushes", "-single-steps", "-l2-0.0001")
-    made = {path.parent.name for path in cards(tmp_path)}
-    assert made == {f"in{form}-seed-0" for form in forms} | {"in-6-pushes-seed-1"}
-    check_test_sets(tmp_path / "robot-quick")
+    # In full, on 3 and on 6 pushes, and with another l2.
+    made = Counter(map(without_hash, cards(tmp_path)))
+    assert made == {"in-seed-0": 4, "in-seed-1": 1, "in-single-steps-seed-0": 1}
+    check_test_sets(tmp_path / STEPS)
 
 
 def check_test_sets(folder):
-    usual = open_store(folder / "test-2-disks").read(slice(None))
-    wrong = open_store(folder / "test-properties-5-percent").read(slice(None))
+    def pushes(name):
+        (found,) = folder.glob(f"robot-{name}-{'[0-9a-f]' * 10}")
+        return open_store(found).read(slice(None))
+
+    usual, wrong = pushes("test"), pushes("test-properties-5-percent")
     for name in ("mass", "radius"):
         off = np.abs(wrong[name] / usual[name] - 1)
         np.testing.assert_allclose(off, 0.05, atol=1e-5)
@@ -112,9 +119,7 @@ def check_test_sets(folder):
     contact, heading = push_angles(usual)
     assert contact.max() <= np.pi / 3
     assert heading.max() <= np.pi / 6 + 1e-5
-    contact, heading = push_angles(
-        open_store(folder / "test-outside-angles").read(slice(None))
-    )
+    contact, heading = push_angles(pushes("test-wide-angles-outside"))
     assert ((contact > np.pi / 3) | (heading > np.pi / 6)).all()
 
 

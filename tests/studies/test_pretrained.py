@@ -1,6 +1,5 @@
-"""The command that makes the shipped networks makes such networks."""
+"""The study of the shipped networks makes such networks."""
 
-import runpy
 from importlib.util import find_spec
 
 import pytest
@@ -15,9 +14,7 @@ from sainet.models.library import (
     load_model,
 )
 from sainet.runs.documents import read_json
-from sainet.studies.paper_setup import paper_setup
-from sainet.studies.strokes import stroke_setup
-from support import REPOSITORY, require
+from support import require
 
 SAME = ("identity", "kind", "time_step", "truth_engine", "camera", "data_seeds")
 SAME += ("recurrent", "residual", "format_version")
@@ -25,17 +22,15 @@ SMALLER = ("iterations", "batch_size")
 
 
 @pytest.mark.slow
-def test_small_networks_have_the_cards_of_shipped_networks(tiny, chain, tmp_path):
+def test_small_networks_have_the_cards_of_shipped_networks(make, tmp_path):
     require(find_spec("pybullet"), "PyBullet is not installed")
-    tool = runpy.run_path(str(REPOSITORY / "tools" / "pretrained.py"))
-    tool["build"](paper_setup("robot", "quick", chain), tmp_path / "into")
-    tool["build_strokes"](stroke_setup("quick", chain), tmp_path / "into")
+    make("pretrained")
+    into = tmp_path / "pretrained" / "networks"
     iterations = dict.fromkeys(OF_PAPER, 10_000) | dict.fromkeys(OF_STROKES, 3_000)
     assert iterations.keys() == set(SHIPPED)
     for name in SHIPPED:
         made, shipped = (
-            read_json(folder / name / CARD)
-            for folder in (tmp_path / "into", PRETRAINED)
+            read_json(folder / name / CARD) for folder in (into, PRETRAINED)
         )
         assert made.keys() == shipped.keys()
         assert made["manifest"].keys() == shipped["manifest"].keys()
@@ -47,4 +42,4 @@ def test_small_networks_have_the_cards_of_shipped_networks(tiny, chain, tmp_path
         ]
         assert recipes[0] == recipes[1]
         assert shipped["config"]["iterations"] == iterations[name]
-        load_model(str(tmp_path / "into" / name)).check_fits("robot", 1 / 240, seed=1)
+        load_model(str(into / name)).check_fits("robot", 1 / 240, seed=1)

@@ -1,6 +1,5 @@
 """The tables of recorded pushes, tiny and on made-up ones: who is made of what."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -8,16 +7,14 @@ import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
+from sainet.datasets.surrogate import Robot
+from sainet.learning.recipes import FROM_ENGINE
 from sainet.models.card import read_card
 from sainet.runs.errors import BadInput
-from sainet.studies import (
-    fine_tuning,
-    load_experiment,
-    recorded_efficiency,
-    recorded_pushes,
-)
+from sainet.studies import data_efficiency, fine_tuning, load_study, recorded_pushes
+from sainet.studies.fine_tuning import Way
 from sainet.studies.recorded_models import Variant, surfaces_of
-from sainet.studies.surrogate import Robot
+from sainet.studies.study import STEPS, Change, Scope
 
 FEW = (
     Variant("sain", "simulation", "identified"),
@@ -52,21 +49,19 @@ def identify(store, folder):
 
 
 @pytest.fixture
-def make(chain, recorded, monkeypatch, tmp_path):
+def tuned(make, recorded, monkeypatch):
+    """Runs a study of recorded pushes, with a few tiny networks."""
     monkeypatch.setattr(recorded_pushes, "VARIANTS", FEW)
     monkeypatch.setattr(recorded_pushes, "FOR_ALL", FEW[1:2])
     monkeypatch.setattr(recorded_pushes, "ELSEWHERE", FEW[:2])
-    monkeypatch.setattr(recorded_efficiency, "VARIANTS", FEW[1:2])
-    monkeypatch.setattr(recorded_efficiency, "PUSHES", {"quick": (3, 5)})
+    monkeypatch.setattr(data_efficiency, "VARIANTS", FEW[1:2])
+    monkeypatch.setattr(data_efficiency, "RECORDED_COUNTS", {"quick": (3, 5)})
     # Of one size, so that everything compiles once.
     small = lambda recipe, *_: recipe.changed(iterations=1, batch_size=4)  # noqa: E731
     monkeypatch.setattr("sainet.studies.recorded_models.scaled", small)
     # It has tests of its own, and compiles for a minute.
-    monkeypatch.setattr("sainet.studies.recorded_models.identify_into", identify)
-    whole = replace(chain, recorded=recorded.path)
-    return lambda name: load_experiment(name)(
-        "quick", replace(whole, out=tmp_path / name)
-    ).to_json()
+    monkeypatch.setattr("sainet.studies.steps.identify_into", identify)
+    return lambda name: make(name, recorded.path)
 
 
 def test_surfaces_are_groups_without_their_speed(recorded):
@@ -74,18 +69,19 @@ def test_surfaces_are_groups_without_their_speed(recorded):
     assert found == {"abs": [*range(12)], "plywood": [*range(12, 24)]}
 
 
-def test_without_recorded_pushes_there_is_no_table(chain):
+def test_without_recorded_pushes_there_is_no_table():
     for name in ("recorded-pushes", "recorded-data-efficiency"):
         with pytest.raises(BadInput, match="`recorded` is missing"):
-            load_experiment(name)("quick", chain)
+            load_study(name).check(Scope("quick"))
 
 
 @pytest.mark.slow
-def test_no_push_is_predicted_by_a_network_trained_on_it(make, tmp_path):
-    table = make("recorded-pushes")
-    names = {"physics", "physics-identified", *(each.name for each in FEW)}
-    told = "sain-identified-residual"
-    everywhere = {*names, f"{told}-for-all"}
+def test_no_push_is_predicted_by_a_network_trained_on_it(tuned, tmp_path):
+    table = tuned("recorded-pushes")
+    names = {"physics", "physics-identified"}
+    names |= {each.identity().slug for each in FEW}
+    subject = "sain-identified-residual"
+    everywhere = {*names, f"{subject}-for-all"}
     rows = {(row["group"], row["model"]): row for row in table["rows"]}
     groups = {"abs": 12, "plywood": 12, "all": 24}
     for group, count in groups.items():
@@ -96,28 +92,29 @@ def test_no_push_is_predicted_by_a_network_trained_on_it(make, tmp_path):
     assert elsewhere == {"abs to plywood, 0 of it", "abs to plywood, 50 of it"}
     assert {row["model"] for row in table["published"]} == {"convex"}
     against = {row["against"] for row in table["comparisons"]}
-    assert against == (everywhere | {"convex"}) - {told}
+    assert against == (everywhere | {"convex"}) - {subject}
     folder = tmp_path / "recorded-pushes"
     assert (folder / "engine-errors.svg").is_file()
     cards = {
-        path.parent.relative_to(folder).as_posix(): read_card(path.parent)
-        for path in folder.rglob("card.json")
+        path.parent.name.rpartition("-")[0]: []
+        for path in (tmp_path / STEPS).rglob("card.json")
     }
-    trained = {told, "sain-tuned-place"}
-    assert {name for name in cards if name.startswith(("abs/", "ply"))} == {
-        f"{surface}/fold-{fold}/{name}"
-        for surface in ("abs", "plywood")
-        for fold in (0, 1)
-        for name in trained
-    }
-    added = cards[f"abs/fold-0/{told}"]
-    assert (added.started_from, added.residual) == (None, True)
-    assert added.internal.simulator.is_identified
-    assert added.identity.features == "paper"
-    tuned = [card for name, card in cards.items() if name.endswith("tuned-place")]
-    assert {card.identity.features for card in tuned} == {"place"}
-    assert {card.started_from for card in tuned} == {tuned[0].started_from} != {None}
-    assert len({card.data for card in cards.values()}) == 8  # no two saw the same
+    for path in (tmp_path / STEPS).rglob("card.json"):
+        cards[path.parent.name.rpartition("-")[0]].append(read_card(path.parent))
+    # Two folds of each surface, two of both, and one surface for the other, twice.
+    counts = {f"{subject}-seed-0": 4 + 2, "sain-tuned-place-seed-0": 4}
+    counts |= {f"{subject}-for-all-seed-0": 2}
+    assert {name: len(found) for name, found in cards.items()} == counts
+    for added in cards[f"{subject}-seed-0"]:
+        assert (added.started_from, added.residual) == (None, True)
+        assert added.internal.simulator.is_identified
+        assert added.identity.features == "paper"
+    tuned_cards = cards["sain-tuned-place-seed-0"]
+    assert {card.identity.features for card in tuned_cards} == {"place"}
+    assert {card.started_from for card in tuned_cards} != {None}
+    assert len({card.started_from for card in tuned_cards}) == 1
+    # No two saw the same.
+    assert len({card.data for found in cards.values() for card in found}) == 8
 
 
 @pytest.mark.slow
@@ -125,9 +122,9 @@ def test_settings_of_tuning_are_compared_over_robots(make, monkeypatch, tmp_path
     one = {"learning_rate": 1e-3, "mirror": False}
     robots = (Robot("a", assumed_friction=0.25), Robot("b", unexplained=0))
     monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
-    monkeypatch.setattr(fine_tuning, "WAYS", (("engine", one),))
-    monkeypatch.setattr(fine_tuning, "WAYS_WITH_FEW", (("engine", {}),))
-    monkeypatch.setattr(fine_tuning, "_TESTS", {"quick": 4})
+    monkeypatch.setattr(fine_tuning, "WAYS", (Way(FROM_ENGINE, Change(**one)),))
+    monkeypatch.setattr(fine_tuning, "WAYS_WITH_FEW", (Way(FROM_ENGINE),))
+    monkeypatch.setattr(fine_tuning, "TESTS", {"quick": 4})
     table = make("fine-tuning")
     rows = {(*row["group"].split("/")[:2], row["model"]): row for row in table["rows"]}
     many, few = "20-pushes", "10-pushes"
@@ -151,15 +148,15 @@ def test_settings_of_tuning_are_compared_over_robots(make, monkeypatch, tmp_path
         assert choice["score"] == pytest.approx(np.mean([*scores.values()]))
         assert choice["scores"] == pytest.approx(scores)
     decided = {
-        path.parent.parent.name: read_card(path.parent).config["l2"]
-        for path in (tmp_path / "fine-tuning").rglob("engine/card.json")
+        read_card(path.parent).config["l2"]
+        for path in (tmp_path / STEPS).rglob("card.json")
     }
-    assert decided == {few: 0.1}  # one over the pushes
+    assert decided == {1 / 20, 1 / 10}  # one over the pushes
 
 
 @pytest.mark.slow
-def test_larger_training_sets_contain_the_smaller_sets(make, tmp_path):
-    table = make("recorded-data-efficiency")
+def test_larger_training_sets_contain_the_smaller_sets(tuned, tmp_path):
+    table = tuned("recorded-data-efficiency")
     groups = {row["group"] for row in table["rows"]}
     assert groups == {"3", "5"}
     assert {row["n"] for row in table["rows"]} == {24}

@@ -8,17 +8,17 @@ from rich.console import Console
 from sainet.evaluation.conditions import Condition
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
-from sainet.models.identity import identity_named
 from sainet.report.arrange import arrange
 from sainet.report.writers import print_table, to_markdown
 from sainet.runs.documents import read_json
 from sainet.studies import simulated_control
-from sainet.studies.published import SIMULATED_CONTROL
-from sainet.studies.simulated_control import Group, groups
+from sainet.studies.paper_setup import IN, SAIN
+from sainet.studies.published import PUBLISHED_SIMULATED_CONTROL
+from sainet.studies.simulated_control import MODELS, trials
 
 
 def test_the_trials_include_those_of_the_paper():
-    found = {group.name: group.config for group in groups(100)}
+    found = {each.name: each.config for each in trials(100)}
     assert all(config.world == "bullet" for config in found.values())
     sizes = [config.trials for config in found.values()]
     assert sizes == [100] * 4 + [50] * 2
@@ -29,12 +29,10 @@ def test_the_trials_include_those_of_the_paper():
 
 @pytest.mark.slow
 def test_all_models_have_the_same_goals(make, tmp_path, monkeypatch):
-    (usual, *_) = groups(2)
+    (usual, *_) = trials(2)
     small = replace(usual.config, world="planar", pushes=1)
-    monkeypatch.setattr(
-        simulated_control, "groups", lambda trials: [Group("easy, greedy", small)]
-    )
-    monkeypatch.setattr(simulated_control, "MODELS", ("physics", "physics-true"))
+    few = replace(usual, config=small, models=MODELS[:2])
+    monkeypatch.setattr(simulated_control, "trials", lambda count: [few])
     table = make("simulated-control")
     assert [row["model"] for row in table["rows"]] == ["physics", "physics-true"]
     assert [row["trials"] for row in table["rows"]] == [2, 2]
@@ -51,7 +49,7 @@ def test_all_models_have_the_same_goals(make, tmp_path, monkeypatch):
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-def trials(model, **changes):
+def row(model, **changes):
     known = {
         "condition": "hard, tree",
         "model": model,
@@ -77,15 +75,15 @@ def compared(measure, p):
 def result():
     none = {"solved": 0, "success": 0.0, "median_pushes": None, "ended_early": 0}
     return Summary(
-        models=(identity_named("sain"), identity_named("in")),
+        models=(SAIN, IN),
         conditions=(Condition(label="hard, tree"),),
-        trials=(trials("sain"), trials("in", **none)),
+        trials=(row("sain"), row("in", **none)),
         tests=(
             compared("solved", 0.125),
             compared("within_4_mm", 0.125),
             compared("within_25_pushes", 0.031),
         ),
-        published=(SIMULATED_CONTROL[1],),
+        published=(PUBLISHED_SIMULATED_CONTROL[1],),
     )
 
 

@@ -1,13 +1,11 @@
 """`sainet demo`."""
 
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Json, Output
+from sainet.cli.progress import Bars
 from sainet.runs.workers import worker_pool
 from sainet.studies.config import DemoConfig
 
@@ -23,20 +21,19 @@ class Demo:
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Run the demo."""
         use_devices(self.devices)
         from sainet.evaluation.as_json import to_json_object
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table
-        from sainet.studies.chain import Chain
         from sainet.studies.demo import run_demo
+        from sainet.studies.runner import Runner
+        from sainet.studies.study import STEPS
 
-        with worker_pool(None) as pool:
-            bar = partial(progress_bar, output=self.output)
-            say = partial(self.output.say, markup=True)
-            chain = Chain(self.out, pool, say, bar)
-            result = run_demo(self.config, chain)
+        with worker_pool(None) as pool, Bars(self.output) as bars:
+            runner = Runner(self.out / STEPS, pool, bars)
+            result = run_demo(self.config, self.out, runner, self.output.say)
         print_table(arrange(result.summary), self.output.console)
         self.output.say(f"Open {result.report} in a browser: it plays.")
         return {"report": str(result.report), **to_json_object(result.summary)}

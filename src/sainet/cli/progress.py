@@ -2,11 +2,16 @@
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING
 
 from sainet.cli.output import Output
 from sainet.runs.interrupts import raise_if_interrupted
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Progress
 
 Advance = Callable[[int, str], None]  # number of finished units, and a note
 COMPILING = "compiling"
@@ -78,3 +83,36 @@ def progress_bar(
         yield advance
         if pace.begun is None:  # everything was finished before
             bar.update(task, total=total, completed=total or 0, note="")
+
+
+class Bars:
+    """Shows the progress of a runner's steps, one bar at a time."""
+
+    def __init__(self, output: Output) -> None:
+        """Show no bar yet."""
+        self._output, self._bar, self._done = output, ExitStack(), 0
+        self._advance: Advance | None = None
+
+    def __call__(self, event: "Progress") -> None:
+        """Show an event on the bar of its step."""
+        if self._advance is None:
+            bar = progress_bar(event.title, event.total, self._output)
+            self._advance, self._done = self._bar.enter_context(bar), 0
+        self._advance(event.done - self._done, event.note)
+        self._done = event.done
+        if event.has_ended:
+            self._bar.close()
+            self._advance = None
+
+    def __enter__(self) -> "Bars":
+        """Return these bars."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Stop the bar that an error interrupted."""
+        self._bar.close()

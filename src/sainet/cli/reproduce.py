@@ -1,45 +1,43 @@
 """`sainet reproduce`."""
 
-from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field, replace
-from functools import partial
-from importlib.util import find_spec
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tyro.conf import Positional
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Output
-from sainet.cli.progress import progress_bar
-from sainet.runs.errors import BadInput
+from sainet.cli.messages import message
+from sainet.cli.output import Json, Output
+from sainet.cli.progress import Bars
+from sainet.runs.errors import BadInput, MissingExtra
 from sainet.runs.workers import core_count, worker_pool
 from sainet.studies.config import Scale
 
 if TYPE_CHECKING:
-    from sainet.studies.chain import Chain
-    from sainet.studies.result import Result
+    from sainet.studies.runner import Runner
+    from sainet.studies.study import Scope, Study
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce:
-    """Reproduce tables; finished steps are not repeated."""
+    """Run studies; finished steps are not repeated."""
 
-    experiments: Positional[tuple[str, ...]] = ()
-    """Experiments: direct-force-two-disks (the paper's Table I),
-    direct-force-three-disks (II) and robot-two-disks (III), with Bullet;
-    data-efficiency, recurrent-or-not, regularisation and robustness, with the networks
-    of Table III; simulated-control, with shipped networks; robot-planar; engine-parity;
-    fine-tuning (settings chosen on simulated pushes); recorded-pushes and
-    recorded-data-efficiency, which need --recorded. Default: every experiment whose
+    studies: Positional[tuple[str, ...]] = ()
+    """Studies: direct-force-two-disks (the paper's Table I), direct-force-three-disks
+    (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
+    regularisation and robustness, with the networks of Table III; simulated-control,
+    with shipped networks; robot-planar; engine-parity; pretrained (the shipped
+    networks); fine-tuning (settings chosen on simulated pushes); recorded-pushes and
+    recorded-data-efficiency, which need --recorded. Default: every study whose
     requirements are met."""
     scale: Scale = "quick"
-    """Size of datasets and training runs: quick for minutes per table, paper for 4,500
+    """Size of datasets and training runs: quick for minutes per study, paper for 4,500
     pushes and 10,000 iterations per network."""
     out: Path = Path("runs/reproduce")
-    """Folder to write, with one run folder per experiment."""
+    """Folder to write, with one folder per study and one run folder per step."""
     recorded: Path | None = None
     """Dataset of recorded pushes, from 'sainet import mitpush-endpoints'.
     Default: none."""
@@ -50,24 +48,53 @@ class Reproduce:
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
-        """Run the experiments one after another."""
+    def run(self) -> Json:
+        """Run the studies one after another."""
         use_devices(self.devices)
-        from sainet.report.arrange import arrange
-        from sainet.report.writers import print_table
-        from sainet.studies.chain import Chain
+        from sainet.studies import STUDIES, load_study
+        from sainet.studies.runner import Runner
+        from sainet.studies.study import STEPS, MissingInput, Scope
 
-        tables: dict[str, Any] = {}
-        bar = partial(progress_bar, output=self.output)
-        with worker_pool(None) as pool, self._trainer_pool() as trainers:
-            chain = Chain(self.out, pool, self.output.say, bar, self.recorded, trainers)
-            for name, make in self._look_up(chain).items():
-                own = replace(chain, out=self.out / f"{name}-{self.scale}")
-                result = make(self.scale, own)
-                print_table(arrange(result.summary), self.output.console)
-                tables[name] = result.to_json()
-        only = next(iter(tables.values()))
-        return only if len(tables) == 1 else {"experiments": tables}
+        scope = Scope(self.scale, self.recorded)
+        studies = {name: load_study(name) for name in self.studies or STUDIES}
+        not_run: dict[str, str] = {}
+        for name, study in studies.items():
+            try:
+                study.check(scope)
+            except (MissingExtra, MissingInput) as error:
+                if self.studies:
+                    raise
+                not_run[name] = message(error, type(self))
+                self.output.warn(f"{name} is not run: {not_run[name]}")
+        tables: dict[str, Json] = {}
+        with (
+            worker_pool(None) as pool,
+            self._trainer_pool() as trainers,
+            Bars(self.output) as bars,
+        ):
+            runner = Runner(self.out / STEPS, pool, bars, trainers)
+            for name, study in studies.items():
+                if name not in not_run:
+                    tables[name] = self._answer(name, study, scope, runner)
+        if len(tables) == 1 and not not_run:
+            return next(iter(tables.values()))
+        return {"studies": tables, "not_run": not_run}
+
+    def _answer(
+        self, name: str, study: "Study", scope: "Scope", runner: "Runner"
+    ) -> Json:
+        """Run a study, print its table and its claims; return its JSON object."""
+        from sainet.report.arrange import arrange
+        from sainet.report.verdicts import rulings
+        from sainet.report.writers import print_table
+
+        self.output.say(f"{name}: {study.question}")
+        result = study.run(scope, runner, self.out / f"{name}-{self.scale}")
+        console = self.output.console
+        print_table(arrange(result.summary), console)
+        for ruling in rulings(study.claims, result.summary):
+            console.print(ruling, markup=False, soft_wrap=True)
+        return result.to_json()
 
     def _trainer_pool(self) -> AbstractContextManager[Executor | None]:
         """Return the processes that train in parallel; None for one at a time.
@@ -86,35 +113,3 @@ class Reproduce:
         if count > 1 and not is_cpu:
             raise BadInput(f"--trainers is {count}; on a GPU it must be 1.")
         return worker_pool(count, core_each=True) if count > 1 else nullcontext()
-
-    def _look_up(self, chain: "Chain") -> dict[str, Callable[..., "Result"]]:
-        """Return what makes each table; what cannot be had is said before any runs."""
-        from sainet.engines import make_engine
-        from sainet.studies import load_experiment, needs_bullet, needs_recorded
-
-        names = self.experiments or self._possible()
-        found = {name: load_experiment(name) for name in names}
-        if any(map(needs_bullet, names)):
-            make_engine("bullet")
-        if any(map(needs_recorded, names)):
-            chain.recorded_pushes()
-        return found
-
-    def _possible(self) -> tuple[str, ...]:
-        """Return what can be made here, and say what cannot."""
-        from sainet.studies import EXPERIMENTS, needs_bullet, needs_recorded
-
-        names = tuple(EXPERIMENTS)
-        for lacks, lacking, needs in (
-            (self.recorded is None, "--recorded", needs_recorded),
-            (
-                find_spec("pybullet") is None,
-                "PyBullet (Python 3.11 only)",
-                needs_bullet,
-            ),
-        ):
-            left = [name for name in names if lacks and needs(name)]
-            if left:
-                self.output.warn(f"Left out without {lacking}: {', '.join(left)}.")
-            names = tuple(name for name in names if name not in left)
-        return names

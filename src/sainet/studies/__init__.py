@@ -1,48 +1,34 @@
-"""One module for each table or figure, published numbers beside ours, and the demo."""
+"""Studies of the paper and beyond, the runner of their steps, and the demo."""
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from sainet.runs.names import load_named
 
 if TYPE_CHECKING:
-    from sainet.studies.result import Result
+    from sainet.studies.study import Study
 
-_TABLES = "sainet.studies.paper_tables"
-EXPERIMENTS = {
-    "direct-force-two-disks": f"{_TABLES}:direct_force_two_disks",
-    "direct-force-three-disks": f"{_TABLES}:direct_force_three_disks",
-    "robot-two-disks": f"{_TABLES}:robot_two_disks",
-    "data-efficiency": "sainet.studies.data_efficiency:run",
-    "recurrent-or-not": "sainet.studies.recurrent_or_not:run",
-    "regularisation": "sainet.studies.regularisation:run",
-    "robustness": "sainet.studies.robustness:run",
-    "simulated-control": "sainet.studies.simulated_control:run",
-    "engine-parity": "sainet.studies.engine_parity:run",
-    "robot-planar": "sainet.studies.robot_planar:run",
-    "fine-tuning": "sainet.studies.fine_tuning:run",
-    "recorded-pushes": "sainet.studies.recorded_pushes:run",
-    "recorded-data-efficiency": "sainet.studies.recorded_efficiency:run",
+STUDIES = {
+    "direct-force-two-disks": "sainet.studies.paper_tables:DIRECT_FORCE_TWO_DISKS",
+    "direct-force-three-disks": "sainet.studies.paper_tables:DIRECT_FORCE_THREE_DISKS",
+    "robot-two-disks": "sainet.studies.paper_tables:ROBOT_TWO_DISKS",
+    "data-efficiency": "sainet.studies.data_efficiency:SIMULATED",
+    "recurrent-or-not": "sainet.studies.variants:RECURRENT_OR_NOT",
+    "regularisation": "sainet.studies.variants:REGULARISATION",
+    "robustness": "sainet.studies.robustness:STUDY",
+    "simulated-control": "sainet.studies.simulated_control:STUDY",
+    "engine-parity": "sainet.studies.engine_parity:STUDY",
+    "robot-planar": "sainet.studies.paper_tables:ROBOT_PLANAR",
+    "pretrained": "sainet.studies.pretrained:STUDY",
+    "fine-tuning": "sainet.studies.fine_tuning:STUDY",
+    "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
+    "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",
 }
-# What the others need beyond the base install.
-_ON_BASE_INSTALL = ("robot-planar", "fine-tuning")
-_RECORDED = ("recorded-pushes", "recorded-data-efficiency")
 
 
-def needs_recorded(name: str) -> bool:
-    """Return whether an experiment needs recorded pushes."""
-    return name in _RECORDED
-
-
-def needs_bullet(name: str) -> bool:
-    """Return whether an experiment needs PyBullet."""
-    return name not in (*_ON_BASE_INSTALL, *_RECORDED)
-
-
-def load_experiment(name: str) -> Callable[..., "Result"]:
-    """Return what makes the table of an experiment, given the scale and a `Chain`.
+def load_study(name: str) -> "Study":
+    """Return a study.
 
     Raises:
-        UnknownName: no experiment has this name.
+        UnknownName: no study has this name.
     """
-    return load_named("experiment", EXPERIMENTS, name)
+    return load_named("study", STUDIES, name)

@@ -1,4 +1,4 @@
-"""Settings of experiments, free of JAX."""
+"""Settings of studies, free of JAX."""
 
 from dataclasses import dataclass
 from typing import Literal

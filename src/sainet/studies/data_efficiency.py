@@ -1,23 +1,23 @@
-"""How many pushes a network needs, alone and around an engine."""
+"""How many pushes a network needs: simulated ones, and recorded ones."""
 
-from collections.abc import Sequence
-from typing import Any
+import numpy as np
 
+from sainet.datasets.splits import Fold, fold_of_push, make_folds
+from sainet.datasets.store import Store
 from sainet.evaluation.conditions import Condition
-from sainet.evaluation.joining import join
-from sainet.evaluation.measurements import Measurements
-from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import PAPER
 from sainet.report.figures.efficiency import draw_data_efficiency
-from sainet.studies.chain import Chain
-from sainet.studies.config import Scale
-from sainet.studies.paper_setup import PaperSetup, paper_setup
-from sainet.studies.result import Result
+from sainet.studies.paper_setup import IN, SAIN, PaperSetup
+from sainet.studies.recorded_models import Tuner, Variant, surfaces_of
+from sainet.studies.recorded_pushes import FOLDS, SUBJECT, JoinFolds
+from sainet.studies.steps import Evaluate, Join
+from sainet.studies.study import RECORDED as RECORDED_PUSHES
+from sainet.studies.study import Plan, Scope, Study
 
+NETWORKS = (IN, SAIN)
 PUSHES = {"quick": (50, 150, 500), "paper": (50, 150, 500, 1500, 4500)}
 SEEDS = {"quick": range(1), "paper": range(3)}
 OTHER_SEEDS = {"quick": range(1, 2), "paper": range(3, 8)}
-NETWORKS = ("in", "sain")
 AGAIN = 500  # pushes, with other seeds
 AGAIN_CONDITION = Condition(
     label=f"{AGAIN:,}, other trainings",
@@ -28,38 +28,41 @@ IN_FULL = Condition(
     factors={"training_pushes": 4500, "iterations": "all"},
 )
 _SHORTER = 4
+RECORDED_COUNTS = {"quick": (10, 20), "paper": (25, 50, 100, 200, 400)}
+VARIANTS = (
+    Variant("in", "tuned"),
+    Variant("sain", "tuned"),
+    Variant("sain", "tuned", "identified"),
+    Variant("sain", "residual", "identified"),
+)
 
 
-def run(scale: Scale, chain: Chain) -> Result:
-    """Train IN and SAIN on ever more pushes of the robot setup; returns the table.
+def _simulated(scope: Scope) -> Plan:
+    """Return IN and SAIN, trained on ever more pushes of the robot setup.
 
-    Every size has a quarter of the iterations, so that what differs is the data: at the
-    paper's scale that is still 55 passes over 4,500 pushes. The networks of Table III,
-    which had all iterations, have a group of their own, outside of the figure. So have
-    further trainings on 500 pushes: where every one of the first three was better
-    around an engine than alone, and three too few to say so, others can tell.
+    Every size has a quarter of the iterations, so that only the data differ: at the
+    paper's scale these are still 55 passes over 4,500 pushes. The networks of Table
+    III, which had all iterations, have a condition of their own, outside the figure. So
+    have further training runs on 500 pushes: in each of the first three the network
+    around an engine was better than alone, and three are too few for a conclusion.
     """
-    setup = paper_setup("robot", scale, chain)
-    tests = setup.test_pushes()
+    paper = PaperSetup("robot", scope.scale)
+    shorter = paper.recipe.changed(
+        iterations=max(paper.sizes.iterations // _SHORTER, 1),
+        halve_every=PAPER.optimiser.halve_every // _SHORTER,
+    )
 
     def measure(
-        condition: Condition,
-        seeds: Sequence[int],
-        **recipe: Any,  # noqa: ANN401
-    ) -> Measurements:
-        trainings = setup.train(NETWORKS, seeds, **recipe)
-        return setup.compare(trainings, tests, condition=condition)
+        condition: Condition, seeds: range, pushes: int | None = None
+    ) -> Evaluate:
+        recipe = shorter if pushes else paper.recipe
+        networks = paper.train(NETWORKS, seeds, recipe, pushes=pushes)
+        return paper.compare(networks, paper.test_pushes(), condition)
 
-    sizes = {pushes: _shorter(setup, pushes) for pushes in PUSHES[scale]}
-    parts = [measure(of_pushes(n), SEEDS[scale], **sizes[n]) for n in sizes]
-    parts += [
-        measure(AGAIN_CONDITION, OTHER_SEEDS[scale], **sizes[AGAIN]),
-        measure(IN_FULL, SEEDS[scale]),
-    ]
-    found = join(parts)
-    summary = summarise(found)
-    draw_data_efficiency(summary, chain.out / "data-efficiency.svg")
-    return chain.finish(Result(summary=summary), measurements=found)
+    seeds, others = SEEDS[scope.scale], OTHER_SEEDS[scope.scale]
+    parts = [measure(of_pushes(n), seeds, n) for n in PUSHES[scope.scale]]
+    again = measure(AGAIN_CONDITION, others, AGAIN)
+    return Plan(Join((*parts, again, measure(IN_FULL, seeds))))
 
 
 def of_pushes(count: int) -> Condition:
@@ -67,11 +70,45 @@ def of_pushes(count: int) -> Condition:
     return Condition(label=f"{count:,}", factors={"training_pushes": count})
 
 
-def _shorter(setup: PaperSetup, pushes: int) -> dict[str, Any]:
-    """Return the settings of a training on few pushes, and what to call it."""
-    return {
-        "pushes": pushes,
-        "form": f"{pushes}-pushes",
-        "iterations": max(setup.sizes.iterations // _SHORTER, 1),
-        "halve_every": PAPER.optimiser.halve_every // _SHORTER,
-    }
+def _recorded(scope: Scope) -> Plan:
+    """Return models tuned on ever more recorded pushes of a surface, cross-validated.
+
+    The smaller sets are parts of the larger ones. A surface with fewer pushes than a
+    size requires gives all of them.
+    """
+    store, sizes = scope.recorded_pushes(), []
+    for pushes in RECORDED_COUNTS[scope.scale]:
+        folds, parts = [], []
+        for rows in surfaces_of(store).values():
+            for fold in make_folds(store, FOLDS[scope.scale], rows):
+                tuner = Tuner(_first(fold, pushes), scope.scale)
+                models = (*tuner.physics(), *map(tuner.model, VARIANTS))
+                folds.append(fold)
+                parts.append(tuner.compare(models, fold.tests))
+        sizes.append(JoinFolds(tuple(parts), tuple(folds), of_pushes(pushes)))
+    return Plan(Join(tuple(sizes)))
+
+
+def _first(fold: Fold, pushes: int) -> Store:
+    """Return so many training pushes of a fold, repeats beside each other."""
+    repeats = fold.training.repeats()
+    kinds = fold_of_push(repeats, len(np.unique(repeats)), seed=fold.number)
+    chosen = np.argsort(kinds, kind="stable")[:pushes]
+    return fold.training.take(chosen)
+
+
+SIMULATED = Study(
+    question="How many simulated pushes does a network need, alone and around an "
+    "engine?",
+    plan=_simulated,
+    figure=draw_data_efficiency,
+    figure_name="data-efficiency.svg",
+)
+RECORDED = Study(
+    question="How many recorded pushes of a surface does a model need?",
+    plan=_recorded,
+    needs=(RECORDED_PUSHES,),
+    subject=SUBJECT,
+    figure=draw_data_efficiency,
+    figure_name="recorded-data-efficiency.svg",
+)

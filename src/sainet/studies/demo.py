@@ -1,5 +1,6 @@
 """The whole method, small: simulate, train, compare, look."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,22 +24,24 @@ from sainet.report.replay import Replay
 from sainet.runs.documents import read_json, write_document
 from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST
-from sainet.studies.chain import Chain
 from sainet.studies.config import DemoConfig
+from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.replays import build_replay, error_curves
-from sainet.studies.result import TABLE, Result
+from sainet.studies.runner import Runner
+from sainet.studies.steps import Evaluate, Simulate, Train
+from sainet.studies.study import TABLE, Result
 
 _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with assumed \
 masses, radii and friction predicts such contacts badly (Physics); a network alone \
-learns them from data (IN); SAIN takes the engine's prediction and learns what is \
-wrong about it. All pushes here are simulated, with noise; the networks saw {pushes:,} \
-pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, true \
-properties, uses the true masses and radii, and an assumed friction.
+learns them from data (IN); SAIN takes the engine's prediction and learns the \
+residual. All pushes here are simulated, with noise; the networks were trained on \
+{pushes:,} pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, \
+true properties, uses the true masses and radii, and an assumed friction.
 
-The replay shows the test push on which the engine is wrong by the median amount. Then \
+The replay shows the test push on which the engine has its median error. Then \
 the SAIN that ships with the package, trained for all {paper:,}, pushes disk 2 to an \
 easy and to a hard goal by the paper's search; that world is simulated as well, with \
-disks, friction and noise that the engine inside does not know."""
+disks, friction and noise that differ from those of the internal engine."""
 GOALS: tuple[Goals, ...] = ("easy", "hard")
 
 
@@ -50,57 +53,59 @@ class DemoResult:
     summary: Summary
 
 
-def run_demo(config: DemoConfig, chain: Chain) -> DemoResult:
-    """Run the chain small and write a report that plays.
+def run_demo(
+    config: DemoConfig, out: Path, runner: Runner, say: Callable[[str], None]
+) -> DemoResult:
+    """Run the method at small scale and write a report that plays.
 
     Args:
-        config: how small.
-        chain: does the steps; what is finished in its folder is not made again.
+        config: size.
+        out: folder of the demo.
+        runner: of the steps, which are not repeated once they are finished.
+        say: called with each stage.
     """
-    out = chain.out
     settings = {"command": "demo", **asdict(config)}
     folder = open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
-    test = _simulate_and_train(chain, config)
-    models = chain.models()
-    chain.say("[bold]3[/] Comparing physics, IN and SAIN on pushes that none has seen.")
-    evaluation = chain.compare(models, test)
-    summary = summarise(evaluation)
-    evaluation.write(out / "measurements.nc")
+    compared = _comparison(config)
+    say("1 Simulating pushes, and what an engine with wrong properties predicts.")
+    *_, network = compared.models
+    assert isinstance(network, Train)
+    runner.result(network.pushes)
+    test = runner.result(compared.pushes)
+    say("2 Training the network alone (IN), then around the engine (SAIN).")
+    models = [runner.result(model) for model in compared.models]
+    say("3 Comparing physics, IN and SAIN on pushes that no network was trained on.")
+    measured = runner.result(compared)
+    summary = summarise(measured)
+    measured.write(out / "measurements.nc")
     write_document(out / TABLE, Result(summary=summary))
-    chain.say("[bold]4[/] Pushing disk 2 to an easy and to a hard goal with SAIN.")
-    episodes = [push_to_goal(chain, goals, config) for goals in GOALS]
-    chain.say("[bold]5[/] Drawing the figures and the report.")
-    report = _draw(models, test, evaluation, config, out)
+    say("4 Pushing disk 2 to an easy and to a hard goal with SAIN.")
+    episodes = [push_to_goal(runner, goals, config) for goals in GOALS]
+    say("5 Drawing the figures and the report.")
+    report = _draw(models, test, measured, config, out)
     report = replace(report, table=summary, episodes=episodes)
     return DemoResult(write_report(report, folder.path / REPORT), summary)
 
 
-def push_to_goal(chain: Chain, goals: Goals, config: DemoConfig) -> dict[str, Any]:
+def push_to_goal(runner: Runner, goals: Goals, config: DemoConfig) -> dict[str, Any]:
     """Return the episode of one goal, pushed to with the SAIN that ships.
 
-    One of 300 iterations overshoots the goal, and no push from behind brings it back.
+    A network of 300 iterations overshoots the goal, and no push from behind returns
+    the disk.
     """
     settings = ControlConfig(model="sain", goals=goals, trials=1, seed=config.seed)
-    with chain.bar(f"Pushing ({goals})", 1) as advance:
+    with runner.bar(f"Pushing ({goals})", 1) as bar:
 
         def on_episode(record: dict[str, Any]) -> None:
-            advance(1, outcome(record))
+            bar.add(1, outcome(record))
 
-        return run_trials(settings, chain.out / goals, on_episode=on_episode)[0]
+        return run_trials(settings, runner.out / goals, on_episode=on_episode)[0]
 
 
-def _simulate_and_train(chain: Chain, config: DemoConfig) -> Store:
-    """Make the datasets and both networks; returns the test set."""
-    chain.say("[bold]1[/] Simulating pushes, and what a wrong engine predicts of them.")
-    train = chain.simulate(
-        "train", GenerateConfig(pushes=config.pushes, seed=config.seed)
-    )
-    test = chain.simulate(
-        "test", GenerateConfig(pushes=config.test_pushes, seed=config.seed + 1)
-    )
-    chain.say(
-        "[bold]2[/] Training the network alone (IN), then around the engine (SAIN)."
-    )
+def _comparison(config: DemoConfig) -> Evaluate:
+    """Return the comparison of physics with both networks, on test pushes."""
+    train = GenerateConfig(pushes=config.pushes, seed=config.seed)
+    test = GenerateConfig(pushes=config.test_pushes, seed=config.seed + 1)
     quarter = max(config.iterations // 4, 1)
     recipe = PAPER.changed(
         iterations=config.iterations,
@@ -109,9 +114,9 @@ def _simulate_and_train(chain: Chain, config: DemoConfig) -> Store:
         log_every=min(10, quarter),
         seed=config.seed,
     )
-    chain.train("in", train, recipe)
-    chain.train("sain", train, recipe)
-    return test
+    pushes = Simulate("train", train)
+    networks = (Train(network, pushes, recipe) for network in (IN, SAIN))
+    return Evaluate((*physics(), *networks), Simulate("test", test))
 
 
 def _draw(
@@ -148,7 +153,7 @@ def _draw(
 def _median_replay(
     models: list[Model], test: Store, evaluation: Measurements
 ) -> Replay:
-    """Return the push on which physics is wrong by the median amount: no cherry."""
+    """Return the push on which physics has its median error."""
     error = evaluation.values("final_pos_mm", "physics").mean(axis=1)
     push = int(np.argsort(error)[len(error) // 2])
     return build_replay(

@@ -4,8 +4,10 @@ The ground truth is Bullet without noise; all engines have the true properties. 
 is not isotropic: its difference from itself is the best possible result.
 """
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
-import msgspec
 import numpy as np
 
 from sainet.datasets.config import GenerateConfig
@@ -13,8 +15,6 @@ from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.evaluation.conditions import Condition
-from sainet.evaluation.joining import join
-from sainet.evaluation.summary import summarise
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
 from sainet.models.library import Model
@@ -22,10 +22,12 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
-from sainet.studies.chain import Chain
-from sainet.studies.config import Scale
-from sainet.studies.result import Result
+from sainet.studies.steps import Evaluate, Join, Simulate, Step
+from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import SetupName
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 PUSHES = 200
 _SETUPS: tuple[SetupName, ...] = ("robot", "direct-force")
@@ -65,34 +67,50 @@ def turn_state(state: State, angle: float) -> State:
     )
 
 
-def run(scale: Scale, chain: Chain) -> Result:
-    """Return a table that compares the engines on 200 random pushes of each setup."""
-    del scale  # both scales are equal
+@dataclass(frozen=True, eq=False)
+class TrueEngine(Step[Model]):
+    """An engine with the true properties: planar, or Bullet in a rotated scene."""
+
+    pressure_radius_ratio: float | None = None  # of the planar engine
+    turned_deg: int = 0  # of Bullet
+
+    @property
+    def name(self) -> str:
+        """The name in tables."""
+        if self.pressure_radius_ratio is None:
+            return f"bullet-at-{self.turned_deg}-deg"
+        return f"planar-{self.pressure_radius_ratio:.2f}"
+
+    def run(self, runner: "Runner") -> Model:
+        """Return the model."""
+        if self.pressure_radius_ratio is None:
+            angle = np.deg2rad(self.turned_deg)
+            engine: AbstractEngine = TurnedEngine(make_engine("bullet"), angle)
+        else:
+            engine = PlanarEngine(pressure_radius_ratio=self.pressure_radius_ratio)
+        return Model(ModelId(kind="physics", name=self.name), PhysicsDynamics(engine))
+
+
+def _plan(scope: Scope) -> Plan:
+    """Return the comparison on random pushes of each setup, equal at both scales."""
+    engines = (
+        *(TrueEngine(pressure_radius_ratio=ratio) for ratio in _RATIOS),
+        *(TrueEngine(turned_deg=degrees) for degrees in (20, 45)),
+    )
     parts = []
     for setup in _SETUPS:
         config = GenerateConfig(
             setup=setup, pushes=PUSHES, engine="bullet", noise_level="none", seed=2
         )
-        store = chain.simulate(setup, config)
         condition = Condition(label=setup, factors={"setup": setup})
-        parts.append(chain.compare(_engines(), store).in_condition(condition))
-    found = join(parts)
-    # Engines are compared with the truth, not with each other.
-    summary = msgspec.structs.replace(summarise(found), comparisons=())
-    return chain.finish(Result(summary=summary), measurements=found)
+        pushes = Simulate(f"{setup}-without-noise", config)
+        parts.append(Evaluate(engines, pushes, condition))
+    return Plan(Join(tuple(parts)))
 
 
-def _engines() -> list[Model]:
-    engines: dict[str, AbstractEngine] = {
-        f"planar-{ratio:.2f}": PlanarEngine(pressure_radius_ratio=ratio)
-        for ratio in _RATIOS
-    }
-    bullet = make_engine("bullet")
-    engines |= {
-        f"bullet-at-{degrees}-deg": TurnedEngine(bullet, np.deg2rad(degrees))
-        for degrees in (20, 45)
-    }
-    return [
-        Model(ModelId(kind="physics", name=name), PhysicsDynamics(engine))
-        for name, engine in engines.items()
-    ]
+STUDY = Study(
+    question="How far is the planar engine from Bullet, and Bullet from itself in a "
+    "rotated scene?",
+    plan=_plan,
+    compares=False,
+)

@@ -1,124 +1,150 @@
 """Settings of fine-tuning on few pushes, compared on surrogate robots."""
 
-from dataclasses import dataclass, replace
-from itertools import product
-from typing import Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from sainet.datasets.store import Store
+from sainet.datasets.surrogate import ROBOTS, Robot, record, simulated_pushes
 from sainet.evaluation.conditions import Condition
-from sainet.evaluation.joining import join
-from sainet.evaluation.measurements import Measurements
-from sainet.evaluation.summary import Summary, summarise
+from sainet.evaluation.summary import Summary
 from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId
-from sainet.models.library import load_model
-from sainet.studies.chain import Chain
-from sainet.studies.config import Scale
-from sainet.studies.result import Choice, Result
-from sainet.studies.surrogate import ROBOTS, Robot, recordings
-from sainet.studies.trainings import scaled
+from sainet.studies.paper_setup import physics, scaled
+from sainet.studies.steps import Evaluate, First, Join, Simulate, Step, Train
+from sainet.studies.study import Change, Choice, Plan, Scope, Study
 
-Change = dict[str, Any]
-
-# The defaults, and what else they could be, one thing at a time.
-CHANGES: tuple[Change, ...] = (
-    {},
-    {"features": "place"},
-    {"learning_rate": 3e-4},
-    {"learning_rate": 3e-3},
-    {"iterations": 300, "halve_every": 200},
-    {"l2": 1e-4},
-    {"l2": 1e-3},
-    {"l2": 1e-2},
-    {"linear_from": 0.0},
-    {"weight_rotation": 1.0},
-    {"mirror": False},
-    {"average": 0},
-    {"hold": 1},
-    {"validation_share": 0.2, "patience": 250},
-)
-WAYS = (("sain-stroke", {}), *product([FROM_ENGINE], CHANGES))
-# With few pushes what matters is how far the network may leave the engine.
-WAYS_WITH_FEW = tuple(
-    product([FROM_ENGINE], ({}, {"l2": 1e-3}, {"l2": 1e-2}, {"l2": 0.1}))
-)
-_TRAINING, _TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
-_FEW = {"quick": 10, "paper": 25}
-
-
-def run(scale: Scale, chain: Chain) -> Result:
-    """Tune in every way that is considered, for every robot; returns the table.
-
-    Returns:
-        The rows of each robot, number of pushes and way, and in `choices` the `scores`
-        of each way: position and rotation errors over those of physics, their mean, by
-        robot. `score` is the mean over the robots.
-    """
-    parts: list[Measurements] = []
-    choices = []
-    tuners = [_tuner(robot, scale, chain) for robot in ROBOTS]
-    with_few = [each.with_few() for each in tuners]
-    for several, ways in ((tuners, WAYS), (with_few, WAYS_WITH_FEW)):
-        for start, change in ways:
-            found = {each.robot: each.tune(start, change) for each in several}
-            parts += found.values()
-            scores = {name: _score(summarise(each)) for name, each in found.items()}
-            choices.append(
-                Choice(
-                    pushes=several[0].training.info.pushes,
-                    start=start,
-                    change={**change},
-                    score=float(np.mean([*scores.values()])),
-                    scores=scores,
-                )
-            )
-    found = join(parts)
-    result = Result(summary=summarise(found), choices=tuple(choices))
-    return chain.finish(result, measurements=found)
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 
 @dataclass(frozen=True)
-class _Tuner:
-    """Tunes on the recordings of one robot."""
+class Way:
+    """One way to fine-tune."""
 
-    robot: str
-    training: Store
-    tests: Store
-    scale: Scale
-    chain: Chain
+    start: str  # `engine`, or a shipped network
+    change: Change = Change()  # to the recipe of such a start
 
-    def with_few(self) -> "_Tuner":
-        """Return a tuner with only the first recordings."""
-        return replace(self, training=self.training.first(_FEW[self.scale]))
 
-    def tune(self, start: str, change: Change) -> Measurements:
-        """Measure the tests."""
-        pushes = self.training.info.pushes
-        recipe = recipe_for(start_named(start)).changed(**change)
-        way = "-".join([start, *(f"{key}-{value}" for key, value in change.items())])
-        name = f"{self.robot}/{pushes}-pushes/{way}"
-        recipe = scaled(recipe, self.scale, pushes)
-        result = self.chain.train("sain", self.training, recipe, name=name)
-        tuned = replace(
-            load_model(str(result.folder)), id=ModelId(kind="sain", name="sain-tuned")
+# The defaults, and other settings, one at a time.
+WAYS = (
+    Way("sain-stroke"),
+    Way(FROM_ENGINE),
+    Way(FROM_ENGINE, Change(features="place")),
+    Way(FROM_ENGINE, Change(learning_rate=3e-4)),
+    Way(FROM_ENGINE, Change(learning_rate=3e-3)),
+    Way(FROM_ENGINE, Change(iterations=300, halve_every=200)),
+    Way(FROM_ENGINE, Change(l2=1e-4)),
+    Way(FROM_ENGINE, Change(l2=1e-3)),
+    Way(FROM_ENGINE, Change(l2=1e-2)),
+    Way(FROM_ENGINE, Change(linear_from=0.0)),
+    Way(FROM_ENGINE, Change(weight_rotation=1.0)),
+    Way(FROM_ENGINE, Change(mirror=False)),
+    Way(FROM_ENGINE, Change(average=0)),
+    Way(FROM_ENGINE, Change(hold=1)),
+    Way(FROM_ENGINE, Change(validation_share=0.2, patience=250)),
+)
+# With few pushes the distance of the network from the engine is decisive.
+WAYS_WITH_FEW = (
+    Way(FROM_ENGINE),
+    *(Way(FROM_ENGINE, Change(l2=l2)) for l2 in (1e-3, 1e-2, 0.1)),
+)
+TRAINING, TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
+FEW = {"quick": 10, "paper": 25}
+_TUNED = ModelId(kind="sain", name="sain-tuned")
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Step[Store]):
+    """The recorded pushes of a surrogate robot."""
+
+    robot: Robot
+    pushes: Simulate
+    is_test: bool
+
+    @property
+    def name(self) -> str:
+        """The pushes and the robot."""
+        return f"{self.pushes.name}-{self.robot.name}"
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the dataset, made where that is unfinished."""
+        made = runner.result(self.pushes)
+        return record(self.robot, made, runner.folder(self), is_test=self.is_test)
+
+
+def _plan(scope: Scope) -> Plan:
+    """Return every way for each robot, then those with few pushes."""
+    scale = scope.scale
+    training = Simulate("training", simulated_pushes(TRAINING[scale], 0))
+    tests = Simulate("tests", simulated_pushes(TESTS[scale], 1))
+    parts = []
+    for count, ways in ((TRAINING[scale], WAYS), (FEW[scale], WAYS_WITH_FEW)):
+        for way in ways:
+            for robot in ROBOTS:
+                pushes: Step[Store] = Record(robot, training, is_test=False)
+                if count < TRAINING[scale]:
+                    pushes = First(pushes, count)
+                recipe = recipe_for(start_named(way.start))
+                recipe = recipe.changed(**msgspec.to_builtins(way.change))
+                tuned = Train(_TUNED, pushes, scaled(recipe, scale, count))
+                parts.append(
+                    Evaluate(
+                        (physics()[0], tuned),
+                        Record(robot, tests, is_test=True),
+                        _condition(robot, count, way),
+                        steps=0,
+                    )
+                )
+    return Plan(Join(tuple(parts)))
+
+
+def _condition(robot: Robot, pushes: int, way: Way) -> Condition:
+    changes = msgspec.to_builtins(way.change).items()
+    words = "-".join([way.start, *(f"{key}-{value}" for key, value in changes)])
+    factors = {"robot": robot.name, "training_pushes": pushes, "start": way.start}
+    return Condition(label=f"{robot.name}/{pushes}-pushes/{words}", factors=factors)
+
+
+def choose(summary: Summary) -> tuple[Choice, ...]:
+    """Return the score of each way: errors over those of physics, their mean by robot.
+
+    `score` is the mean over the robots.
+    """
+    choices = []
+    counts = sorted({int(c.factors["training_pushes"]) for c in summary.conditions})
+    for count, ways in zip(reversed(counts), (WAYS, WAYS_WITH_FEW), strict=True):
+        for way in ways:
+            scores = {
+                robot.name: _score(summary, _condition(robot, count, way).label)
+                for robot in ROBOTS
+            }
+            choice = Choice(
+                pushes=count,
+                start=way.start,
+                change=way.change,
+                score=float(np.mean([*scores.values()])),
+                scores=scores,
+            )
+            choices.append(choice)
+    return tuple(choices)
+
+
+def _score(summary: Summary, where: str) -> float:
+    tuned, engine = (
+        np.array(
+            [summary.errors(m, k, where) for k in ("final_pos_mm", "final_rot_deg")]
         )
-        models = [load_model("physics"), tuned]
-        found = self.chain.compare(models, self.tests, steps=0)
-        factors = {"robot": self.robot, "training_pushes": pushes, "start": start}
-        return found.in_condition(Condition(label=name, factors=factors))
-
-
-def _tuner(robot: Robot, scale: Scale, chain: Chain) -> _Tuner:
-    training = recordings(robot, "training", _TRAINING[scale], 0, chain)
-    tests = recordings(robot, "tests", _TESTS[scale], 1, chain)
-    return _Tuner(robot.name, training, tests, scale, chain)
-
-
-def _score(summary: Summary) -> float:
-    tuned, physics = (
-        np.array([summary.errors(m, k) for k in ("final_pos_mm", "final_rot_deg")])
-        for m in ("sain-tuned", "physics")
+        for m in (_TUNED.slug, "physics")
     )
-    return float(np.mean(tuned / physics))
+    return float(np.mean(tuned / engine))
+
+
+STUDY = Study(
+    question="With which settings should networks be fine-tuned on few pushes?",
+    plan=_plan,
+    needs=(),
+    choose=choose,
+)

@@ -1,31 +1,36 @@
-"""The paper's two setups with Bullet as the truth: data and networks, made once.
+"""The paper's two setups with Bullet as the truth: their pushes and networks."""
 
-All experiments of one setup and scale share one folder, so that what one has
-simulated or trained, no other makes again.
-"""
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from sainet.datasets.bystander import add_bystander
+from msgspec import structs
+
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
+from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.conditions import Condition
-from sainet.evaluation.measurements import Measurements
-from sainet.learning.recipes import FINE_TUNING, PAPER, FromModel, Recipe
-from sainet.studies.chain import Chain
+from sainet.learning.recipes import FINE_TUNING, PAPER, Recipe
+from sainet.models.identity import ModelId
+from sainet.models.library import PHYSICS
 from sainet.studies.config import Scale
-from sainet.studies.trainings import Training, scaled
+from sainet.studies.steps import (
+    Evaluate,
+    First,
+    Load,
+    Simulate,
+    Step,
+    Train,
+    WithBystander,
+)
 from sainet.worlds.config import SetupName
 
-AROUND = {
-    "sain-bullet": "bullet",
-    "sain": "planar",
-    "sain-true": "planar-true",
-}
-NETWORKS = ("in", *AROUND)
-BYSTANDER = "bystander"  # what networks are called that went on beside one
+IN = ModelId(kind="in")
+SAIN_BULLET, SAIN, SAIN_TRUE = (
+    ModelId(kind="sain", simulator=SIMULATORS[name])
+    for name in ("bullet", "planar", "planar-true")
+)
+NETWORKS = (IN, SAIN_BULLET, SAIN, SAIN_TRUE)
+_QUICK_ITERATIONS = 20
 _CHUNK = 250  # pushes
 _TEST_SEED, _VALIDATION_SEED = 1, 2
 
@@ -48,115 +53,114 @@ class PaperSetup:
 
     setup: SetupName
     scale: Scale
-    chain: Chain  # of the shared folder
 
     @property
     def sizes(self) -> Sizes:
         """How much is simulated and trained."""
         return SIZES[self.scale]
 
-    def training_pushes(self) -> Store:
-        """Return the pushes that networks are trained on, every s-bar with them."""
-        around = tuple(AROUND.values())
-        return self._simulate("train", self.sizes.pushes, assumed_engine=around)
+    @property
+    def recipe(self) -> Recipe:
+        """The paper's recipe, with the iterations of the scale."""
+        return PAPER.changed(iterations=self.sizes.iterations)
 
-    def test_pushes(self, name: str = "test-2-disks", **changes: Any) -> Store:  # noqa: ANN401
-        """Return the test pushes, or others of the same number with other settings."""
-        return self._simulate(name, self.sizes.tests, seed=_TEST_SEED, **changes)
+    def training_pushes(self) -> Simulate:
+        """Return the training pushes, with the predictions of every internal engine."""
+        names = ("bullet", "planar", "planar-true")
+        config = GenerateConfig(pushes=self.sizes.pushes, assumed_engine=names)
+        return self._simulate("train", config)
 
-    def validation_pushes(self) -> Store:
+    def test_pushes(
+        self, label: str = "test", config: GenerateConfig | None = None
+    ) -> Simulate:
+        """Return the test pushes, or as many others with some other settings."""
+        config = config or GenerateConfig()
+        config = replace(config, pushes=self.sizes.tests, seed=_TEST_SEED)
+        return self._simulate(label, config)
+
+    def validation_pushes(self) -> Simulate:
         """Return pushes to choose settings by: neither trained nor tested on."""
-        return self._simulate("validation", self.sizes.tests, seed=_VALIDATION_SEED)
-
-    def training_pushes_with_bystander(self) -> Store:
-        """Return the same pushes, beside each a disk that nothing touches."""
-        store, name = self.training_pushes(), "train-bystander"
-        total = store.info.pushes * len(store.info.assumed_engines)
-        with self.chain.bar(f"Predicting s-bar of {name}", total) as advance:
-            return add_bystander(
-                store, self.chain.out / name, on_pushes=lambda n: advance(n, "")
-            )
+        config = GenerateConfig(pushes=self.sizes.tests, seed=_VALIDATION_SEED)
+        return self._simulate("validation", config)
 
     def train(
         self,
-        names: Sequence[str],
+        networks: Sequence[ModelId],
         seeds: Sequence[int],
+        recipe: Recipe | None = None,
         *,
-        form: str = "",
         pushes: int | None = None,
-        **changes: Any,  # noqa: ANN401
-    ) -> dict[str, list[str]]:
-        """Train some of `NETWORKS`; returns the names of each one's folders.
+    ) -> tuple[Train, ...]:
+        """Return a training run of each network from each seed.
 
         Args:
-            names: of the networks.
-            seeds: a training of each network for each.
-            form: of the training, where it is not the usual one: goes into the names.
-            pushes: how many of the training pushes to use; None is all.
-            changes: settings of the training that are not the paper's.
+            networks: some of `NETWORKS`, perhaps as another variant.
+            seeds: of the training runs.
+            recipe: by default the paper's.
+            pushes: number of training pushes; None: all.
         """
-        count = self.sizes.pushes if pushes is None else pushes
-        size = min(PAPER.optimiser.batch_size, count)
-        usual = PAPER.changed(iterations=self.sizes.iterations, batch_size=size)
-        store, recipe = self.training_pushes().first(count), usual.changed(**changes)
-        return self.chain.train_seeds(
-            {name: self._training(name, store, recipe, form) for name in names}, seeds
+        count, data = self.sizes.pushes, self.training_pushes()
+        chosen: Step[Store] = data
+        if pushes not in (None, count):
+            count, chosen = pushes, First(data, pushes)
+        recipe = recipe or self.recipe
+        batch = min(recipe.optimiser.batch_size, count)
+        return tuple(
+            Train(network, chosen, recipe.changed(batch_size=batch, seed=seed))
+            for network in networks
+            for seed in seeds
         )
 
     def train_beside_bystander(
-        self, names: Sequence[str], seeds: Sequence[int]
-    ) -> dict[str, list[str]]:
-        """Let trained ones of `NETWORKS` go on, beside a disk that nothing touches.
+        self, networks: Sequence[ModelId], seeds: Sequence[int]
+    ) -> tuple[Train, ...]:
+        """Return networks that are fine-tuned beside a disk that nothing touches.
 
-        With the settings that hold for going on from any network, but for the steps,
-        which are those that the network was trained on.
+        By the recipe of fine-tuning any network, but for the steps, which are those of
+        the network's own training.
         """
-        store = self.training_pushes_with_bystander()
-        usual = FINE_TUNING.changed(steps=PAPER.horizon.steps)
-        usual = scaled(usual, self.scale, store.info.pushes)
-        trainings = {}
-        for name in names:
-            recipe = usual.changed(start=FromModel(str(self.chain.out / name)))
-            trainings[name] = self._training(name, store, recipe, BYSTANDER)
-        return self.chain.train_seeds(trainings, seeds)
-
-    def _training(self, name: str, store: Store, recipe: Recipe, form: str) -> Training:
-        return Training(
-            "in" if name == "in" else "sain",
-            store,
-            recipe,
-            self.chain.out / with_form(name, form),
-            AROUND.get(name, "planar"),
+        pushes = WithBystander(self.training_pushes())
+        recipe = FINE_TUNING.changed(steps=PAPER.horizon.steps)
+        recipe = scaled(recipe, self.scale, self.sizes.pushes)
+        return tuple(
+            Train(
+                structs.replace(start.id, variant="bystander"),
+                pushes,
+                recipe.changed(seed=start.recipe.seed),
+                start=start,
+            )
+            for start in self.train(networks, seeds)
         )
 
     def compare(
         self,
-        trainings: Mapping[str, Sequence[str]],
-        tests: Store,
-        *,
+        networks: Sequence[Train],
+        tests: Step[Store],
         condition: Condition | None = None,
-    ) -> Measurements:
-        """Measure physics (Bullet) and networks, in one condition if it is given."""
-        found = self.chain.compare_trainings(trainings, tests, engine="bullet")
-        return found if condition is None else found.in_condition(condition)
+    ) -> Evaluate:
+        """Return the errors of physics (Bullet) and networks."""
+        return Evaluate((*physics("bullet"), *networks), tests, condition)
 
-    def _simulate(self, name: str, pushes: int, **changes: Any) -> Store:  # noqa: ANN401
-        config = GenerateConfig(
+    def _simulate(self, label: str, config: GenerateConfig) -> Simulate:
+        whole = replace(
+            config,
             setup=self.setup,
-            pushes=pushes,
             engine="bullet",
-            chunk_size=min(_CHUNK, pushes),  # whole chunks are simulated
-            **changes,
+            chunk_size=min(_CHUNK, config.pushes),  # whole chunks are simulated
         )
-        return self.chain.simulate(name, config)
+        return Simulate(f"{self.setup}-{label}", whole)
 
 
-def with_form(name: str, form: str) -> str:
-    """Return what a network is called whose training has a form of its own."""
-    return "-".join(part for part in (name, form) if part)
+def physics(engine: str = "planar") -> tuple[Load, ...]:
+    """Return both physics models: assumed properties, and true masses and radii."""
+    return tuple(
+        Load(ModelId(kind="physics", simulator=SIMULATORS[names[engine]]), name, engine)
+        for name, names in PHYSICS.items()
+    )
 
 
-def paper_setup(setup: SetupName, scale: Scale, chain: Chain) -> PaperSetup:
-    """Return a setup whose folder lies beside that of the experiment."""
-    shared = replace(chain, out=chain.out.parent / f"{setup}-{scale}")
-    return PaperSetup(setup, scale, shared)
+def scaled(recipe: Recipe, scale: Scale, pushes: int) -> Recipe:
+    """Return a recipe for so many pushes: the quick scale has a few iterations."""
+    recipe = recipe.changed(batch_size=min(recipe.optimiser.batch_size, pushes))
+    quick = recipe.changed(iterations=_QUICK_ITERATIONS)
+    return quick if scale == "quick" else recipe

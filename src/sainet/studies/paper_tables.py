@@ -1,85 +1,82 @@
-"""The paper's tables of prediction errors (Tables I to III), with Bullet as the truth.
+"""The paper's tables of prediction errors (Tables I to III), and Table III on planar.
 
-Rows: physics alone with the paper's properties and calibrated, the network alone, and
-the network around three engines: Bullet (the paper's SAIN), planar (which plans fast)
-and planar with the true masses and radii (what a user who knows the disks would pick).
-Table II has the networks a second time, after they have met a bystander.
+Rows: physics with assumed properties and with true masses and radii, the network alone,
+and the network around three engines: Bullet (the paper's SAIN), planar (which plans
+fast) and planar with the true masses and radii (for users who have measured the disks).
+Table II has the networks a second time, fine-tuned beside a bystander.
 """
 
-from dataclasses import dataclass
-
-import msgspec
-
-from sainet.evaluation.conditions import PublishedValues
-from sainet.evaluation.summary import summarise
-from sainet.studies.chain import Chain
-from sainet.studies.config import Scale
-from sainet.studies.paper_setup import BYSTANDER, NETWORKS, paper_setup, with_form
+from sainet.datasets.config import GenerateConfig
+from sainet.learning.recipes import PAPER
+from sainet.studies.paper_setup import IN, NETWORKS, SAIN, PaperSetup, physics
 from sainet.studies.published import (
-    DIRECT_FORCE_THREE_DISKS,
-    DIRECT_FORCE_TWO_DISKS,
-    ROBOT_TWO_DISKS,
+    PUBLISHED_DIRECT_FORCE_THREE_DISKS,
+    PUBLISHED_DIRECT_FORCE_TWO_DISKS,
+    PUBLISHED_ROBOT_TWO_DISKS,
 )
-from sainet.studies.result import Result
+from sainet.studies.steps import Evaluate, Simulate, Train
+from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import SetupName
 
-TRAINED_DISKS = 2
-BESIDE = NETWORKS  # what meets a bystander before it meets three disks
-SEEDS = {"quick": range(1), "paper": range(5)}  # trainings of each network
+BESIDE = NETWORKS  # fine-tuned beside a bystander
+SEEDS = {"quick": range(1), "paper": range(5)}  # training runs of each network
+# Training pushes, test pushes, iterations, training runs of the table on planar.
+_PLANAR_SIZES = {"quick": (1000, 200, 500, 1), "paper": (4500, 500, 10_000, 3)}
 
 
-@dataclass(frozen=True)
-class PaperTable:
-    """One table of the paper: trained on two disks, tested on so many."""
-
-    setup: SetupName
-    disks: int
-    published: tuple[PublishedValues, ...]
+def _two_disks(setup: SetupName, scope: Scope) -> Plan:
+    paper = PaperSetup(setup, scope.scale)
+    networks = paper.train(NETWORKS, SEEDS[scope.scale])
+    return Plan(paper.compare(networks, paper.test_pushes()))
 
 
-def direct_force_two_disks(scale: Scale, chain: Chain) -> Result:
-    """Make Table I again."""
-    return make_table(
-        PaperTable("direct-force", 2, DIRECT_FORCE_TWO_DISKS), scale, chain
+def _three_disks(scope: Scope) -> Plan:
+    """Return the steps of Table II: the networks of Table I on scenes of three disks.
+
+    In pushes of two disks no disk stays untouched. Networks that were fine-tuned beside
+    a bystander were still trained only on pushes of two disks.
+    """
+    paper, seeds = PaperSetup("direct-force", scope.scale), SEEDS[scope.scale]
+    networks = paper.train(NETWORKS, seeds)
+    networks += paper.train_beside_bystander(BESIDE, seeds)
+    three = paper.test_pushes("test-3-disks", GenerateConfig(disks=3))
+    return Plan(
+        paper.compare(networks, three), paper.compare(networks, paper.test_pushes())
     )
 
 
-def direct_force_three_disks(scale: Scale, chain: Chain) -> Result:
-    """Make Table II again: the networks of Table I on scenes of three disks.
-
-    And networks that went on from them beside a bystander, for in two-disk pushes no
-    disk is untouched: still trained on nothing but pushes of two disks.
-    """
-    return make_table(
-        PaperTable("direct-force", 3, DIRECT_FORCE_THREE_DISKS), scale, chain
+def _planar(scope: Scope) -> Plan:
+    pushes, tests, iterations, runs = _PLANAR_SIZES[scope.scale]
+    train = Simulate("planar-train", GenerateConfig(pushes=pushes))
+    test = Simulate("planar-test", GenerateConfig(pushes=tests, seed=1))
+    recipe = PAPER.changed(iterations=iterations)
+    networks = tuple(
+        Train(network, train, recipe.changed(seed=seed))
+        for network in (IN, SAIN)
+        for seed in range(runs)
     )
+    return Plan(Evaluate((*physics(), *networks), test))
 
 
-def robot_two_disks(scale: Scale, chain: Chain) -> Result:
-    """Make Table III again."""
-    return make_table(PaperTable("robot", 2, ROBOT_TWO_DISKS), scale, chain)
-
-
-def make_table(table: PaperTable, scale: Scale, chain: Chain) -> Result:
-    """Simulate, train and compare.
-
-    Args:
-        table: which one.
-        scale: `paper` is 4,500 pushes, 500 test pushes and 10,000 iterations.
-        chain: does the steps; its folder is the table's, what is shared lies beside it.
-    """
-    setup = paper_setup(table.setup, scale, chain)
-    tests = setup.test_pushes(f"test-{table.disks}-disks", disks=table.disks)
-    trainings = setup.train(NETWORKS, SEEDS[scale])
-    more_disks = table.disks > TRAINED_DISKS
-    if more_disks:
-        beside = setup.train_beside_bystander(BESIDE, SEEDS[scale])
-        trainings |= {with_form(name, BYSTANDER): beside[name] for name in BESIDE}
-    found = setup.compare(trainings, tests).with_published(table.published)
-    measured = {"measurements": found}
-    result = Result(summary=summarise(found))
-    if more_disks:
-        found = setup.compare(trainings, setup.test_pushes())
-        measured["as_trained"] = found
-        result = msgspec.structs.replace(result, as_trained=summarise(found))
-    return chain.finish(result, **measured)
+DIRECT_FORCE_TWO_DISKS = Study(
+    question="Table I: does a network around an engine err less than either, on "
+    "pushes of two disks by a force?",
+    plan=lambda scope: _two_disks("direct-force", scope),
+    published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
+)
+DIRECT_FORCE_THREE_DISKS = Study(
+    question="Table II: do networks trained on two disks predict three?",
+    plan=_three_disks,
+    published=PUBLISHED_DIRECT_FORCE_THREE_DISKS,
+)
+ROBOT_TWO_DISKS = Study(
+    question="Table III: the same as Table I on pushes by a robot?",
+    plan=lambda scope: _two_disks("robot", scope),
+    published=PUBLISHED_ROBOT_TWO_DISKS,
+)
+ROBOT_PLANAR = Study(
+    question="Table III with the planar engine as truth, on the base installation?",
+    plan=_planar,
+    needs=(),
+    published=PUBLISHED_ROBOT_TWO_DISKS,
+)

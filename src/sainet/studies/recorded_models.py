@@ -1,15 +1,14 @@
-"""The models that are compared on recorded pushes, and how each comes to be."""
+"""The models that are compared on recorded pushes, and how each is made."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from jaxtyping import Int
 
 from sainet.datasets.store import Store
-from sainet.identification.identify import identify_into
+from sainet.engines.simulator import SIMULATORS, Assumptions, PlanarSpec
 from sainet.learning.recipes import (
     FINE_TUNING,
     RESIDUAL,
@@ -21,25 +20,32 @@ from sainet.learning.recipes import (
 from sainet.models.card import read_identified
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
-from sainet.models.identity import identity_named
+from sainet.models.identity import ModelId
+from sainet.models.identity import Variant as Made
 from sainet.models.library import Model, load_model, network_folder
 from sainet.models.wrappers import with_camera
-from sainet.studies.chain import Chain
 from sainet.studies.config import Scale
-from sainet.studies.trainings import scaled
+from sainet.studies.paper_setup import physics, scaled
+from sainet.studies.steps import Evaluate, Identify, Load, Step, Train, given
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
-_STROKES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped, of simulated strokes
+# In identities: every training set has its own identified parameters.
+_IDENTIFIED = PlanarSpec(assumptions=Assumptions(table_friction=0.15, mass=(1.0,)))
+_LONG_PUSHES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped networks
 
 
 @dataclass(frozen=True)
 class Variant:
-    """A network, what it knows, and what of.
+    """A network, its training, its internal engine and its features.
 
-    Simulation: of strokes that the nominal engine made, and nothing else. The others
-    learn recorded pushes. Tuned: begins with the network of simulation. Residual: adds
-    to the engine, and nothing at first. Real: begins with nothing, in the paper's form.
+    Simulation: trained only on long pushes that the nominal engine simulated. The
+    others train on recorded pushes. Tuned: starts from the network of simulation.
+    Residual: an additive network. Real: starts with random weights, in the paper's
+    form.
     """
 
     network: ModelKind
@@ -47,16 +53,16 @@ class Variant:
     engine: Inside = "nominal"
     features: Features = "paper"
 
-    @property
-    def name(self) -> str:
-        """What tables and folders call it."""
-        parts = [
-            self.network,
-            "identified" if self.engine == "identified" else "",
-            self.learned,
-            "place" if self.features == "place" else "",
-        ]
-        return "-".join(part for part in parts if part)
+    def identity(self, variant: Made = "") -> ModelId:
+        """Return the identity in tables."""
+        inside = SIMULATORS["planar"] if self.engine == "nominal" else _IDENTIFIED
+        return ModelId(
+            kind=self.network,
+            simulator=None if self.network == "in" else inside,
+            data=self.learned,
+            features=self.features,
+            variant=variant,
+        )
 
 
 def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
@@ -67,58 +73,63 @@ def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
     return {name: np.flatnonzero(owner == name) for name in dict.fromkeys(groups)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class AroundIdentified(Step[Model]):
+    """A shipped network around another engine than it was trained around."""
+
+    id: ModelId
+    network: str
+    identified: Identify
+
+    @property
+    def name(self) -> str:
+        """The name in tables."""
+        return self.id.slug
+
+    def run(self, runner: "Runner") -> Model:
+        """Return the model."""
+        network = load_network(network_folder(self.network))[0]
+        internal = read_identified(runner.folder(self.identified)).engine
+        around = SimulatorAugmented(network, internal.simulator.build())
+        dynamics = with_camera(around, internal.camera)
+        return replace(load_model(self.network), id=self.id, dynamics=dynamics)
+
+
 class Tuner:
-    """Makes models of some training pushes, each in a folder of its own, once."""
+    """Models of some training pushes."""
 
-    training: Store
-    folder: str  # in that of the chain
-    scale: Scale
-    chain: Chain
+    def __init__(self, training: Store, scale: Scale) -> None:
+        """Identify the engine on the same pushes."""
+        self._scale: Scale = scale
+        self._pushes = given(training)
+        identity = ModelId(kind="physics", simulator=_IDENTIFIED)
+        self.identified = Identify(identity, self._pushes)
 
-    def physics(self) -> list[Model]:
+    def physics(self) -> tuple[Step[Model], Step[Model]]:
         """Return the engine as it is and with parameters identified on the pushes."""
-        identified = load_model(str(self._identified()))
-        return [
-            load_model("physics"),
-            replace(identified, id=identity_named("physics-identified")),
-        ]
+        return physics()[0], self.identified
 
-    def models(self, variants: Sequence[Variant]) -> list[Model]:
-        """Return networks, trained where they are to be."""
-        return [
-            replace(self._model(each), id=identity_named(each.name))
-            for each in variants
-        ]
-
-    def _model(self, variant: Variant) -> Model:
-        strokes, is_identified = _STROKES[variant.network], variant.engine != "nominal"
+    def model(self, variant: Variant, made: Made = "") -> Step[Model]:
+        """Return a network, trained where it is to be."""
+        shipped, identity = _LONG_PUSHES[variant.network], variant.identity(made)
+        is_identified = variant.engine == "identified"
+        if variant.learned == "simulation" and is_identified:
+            return AroundIdentified(identity, shipped, self.identified)
         if variant.learned == "simulation":
-            found = load_model(strokes)
-            return self._around_identified(found) if is_identified else found
+            return Load(identity, shipped)
         recipe = {
-            "tuned": FINE_TUNING.changed(start=FromModel(strokes)),
+            "tuned": FINE_TUNING.changed(start=FromModel(shipped)),
             "residual": RESIDUAL,
             "real": FINE_TUNING.changed(start=Fresh()),
         }[variant.learned].changed(features=variant.features)
-        result = self.chain.train(
-            variant.network,
-            self.training,
-            scaled(recipe, self.scale, self.training.info.pushes),
-            name=f"{self.folder}/{variant.name}",
-            assumed_engine=str(self._identified()) if is_identified else "planar",
+        return Train(
+            identity,
+            self._pushes,
+            scaled(recipe, self._scale, self._pushes.store.info.pushes),
+            self.identified if is_identified else None,
         )
-        return load_model(str(result.folder))
 
-    def _around_identified(self, model: Model) -> Model:
-        """Return a network around another engine than it was trained around."""
-        network = load_network(network_folder(model.name))[0]
-        internal = read_identified(self._identified()).engine
-        around = SimulatorAugmented(network, internal.simulator.build())
-        return replace(model, dynamics=with_camera(around, internal.camera))
-
-    def _identified(self) -> Path:
-        """Return the folder of the engine with what the training pushes tell of it."""
-        folder = self.chain.out / self.folder / "identified"
-        identify_into(self.training, folder)
-        return folder
+    @staticmethod
+    def compare(models: Sequence[Step[Model]], tests: Store) -> Evaluate:
+        """Return the errors of models on test pushes."""
+        return Evaluate(tuple(models), given(tests))

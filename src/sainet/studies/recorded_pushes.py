@@ -1,14 +1,15 @@
-"""The honest table on real recorded pushes: calibrate or learn, and from what?
+"""Cross-validated comparison on recorded pushes: identify the engine, or learn?
 
-Cross-validated: each push is predicted by models that saw neither it nor a repeat of
-it. A network is told masses and radii and nothing of the table, so each surface has
-models of its own, as a robot has that stands at one table; what one network for all of
-them loses is said beside it.
+Each push is predicted by models that were trained neither on it nor on a repeat of it.
+A network takes masses and radii as inputs, but nothing of the table, so each surface
+has models of its own, like a robot at one table; the errors of one network for all
+surfaces stand beside them.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,21 +17,16 @@ from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
 from sainet.evaluation.conditions import Condition
 from sainet.evaluation.evaluate import EndOffsets, end_offsets
-from sainet.evaluation.joining import (
-    add_models,
-    join,
-    join_folds,
-    without_predictions,
-)
+from sainet.evaluation.joining import add_models, join_folds, without_predictions
 from sainet.evaluation.measurements import Measurements
-from sainet.evaluation.summary import summarise
 from sainet.learning.recipes import Features, ModelKind
-from sainet.models.identity import identity_named
-from sainet.report.figures.engine_errors import draw_engine_errors
-from sainet.studies.chain import Chain
-from sainet.studies.config import Scale
+from sainet.models.library import Model
 from sainet.studies.recorded_models import Inside, Learned, Tuner, Variant, surfaces_of
-from sainet.studies.result import Result
+from sainet.studies.steps import Evaluate, Given, Join, Step, given
+from sainet.studies.study import RECORDED, Plan, Scope, Study
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 FOLDS = {"quick": 2, "paper": 5}
 NETWORKS: tuple[tuple[ModelKind, Inside], ...] = (
@@ -38,7 +34,7 @@ NETWORKS: tuple[tuple[ModelKind, Inside], ...] = (
     ("sain", "nominal"),
     ("sain", "identified"),
 )
-# What learns from recorded pushes alone: SAIN has an engine to add to, IN has none.
+# Trained only on recorded pushes: SAIN adds to its internal engine, IN has none.
 ALONE: tuple[tuple[ModelKind, Learned, Inside], ...] = (
     ("in", "real", "nominal"),
     ("sain", "residual", "nominal"),
@@ -52,7 +48,7 @@ VARIANTS = (
         for features, (network, engine) in product(FEATURES, NETWORKS)
     ),
     *(Variant(*alone, features) for features, alone in product(FEATURES, ALONE)),
-    Variant("sain", "real"),  # in the paper's form, to see what the residual one gives
+    Variant("sain", "real"),  # the paper's form, to see the effect of the additive form
 )
 FOR_ALL = tuple(
     Variant("sain", "residual", "identified", features) for features in FEATURES
@@ -60,100 +56,122 @@ FOR_ALL = tuple(
 ELSEWHERE = tuple(
     each for each in VARIANTS if each.features == "paper" and each.learned != "real"
 )
-TOLD = "sain-identified-residual"  # the row that others are compared with
+# The row that others are compared with.
+SUBJECT = Variant("sain", "residual", "identified").identity().slug
 FEW = 50  # pushes of a surface that a network was not made for
 _EVERYWHERE, _FROM, _TO = "all", "abs", "plywood"
 
 
-def run(scale: Scale, chain: Chain) -> Result:
-    """Tune, train and identify on each fold; returns the table.
+@dataclass(frozen=True, eq=False)
+class JoinFolds(Step[Measurements]):
+    """Measurements of all folds of a cross-validation."""
 
-    Args:
-        scale: `paper` has five folds and every iteration.
-        chain: does the steps; it knows the recorded pushes.
+    parts: tuple[Step[Measurements], ...]
+    folds: tuple[Fold, ...] = field(repr=False)  # of the parts, which identify them
+    condition: Condition | None = None
 
-    Raises:
-        BadInput: no recorded pushes were given.
-    """
-    store = chain.recorded_pushes()
-    whole = join_folds(
-        [
-            (fold, _by_surface(fold, surface, scale, chain))
-            for surface, rows in surfaces_of(store).items()
-            for fold in make_folds(store, FOLDS[scale], rows)
-        ]
-    )
-    for_all = join_folds(
-        [
-            (fold, _for_all(fold, scale, chain))
-            for fold in make_folds(store, FOLDS[scale])
-        ]
-    )
-    whole = _with_surfaces(add_models(whole, without_predictions(for_all)), store)
-    found = join([whole, *_elsewhere(store, scale, chain)])
-    result = Result(summary=summarise(found, subject=TOLD))
-    chain.finish(result, measurements=found)
-    cases = dict(_engine_errors(store, scale, chain))
-    draw_engine_errors(cases, chain.out / "engine-errors.svg")
-    return result
+    @property
+    def name(self) -> str:
+        """The number of folds."""
+        return f"{len(self.folds)} folds"
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the measurements in one condition, if one is given."""
+        measured = map(runner.result, self.parts)
+        found = join_folds([*zip(self.folds, measured, strict=True)])
+        return found if self.condition is None else found.in_condition(self.condition)
 
 
-def _engine_errors(
-    store: Store, scale: Scale, chain: Chain
-) -> Iterator[tuple[str, EndOffsets]]:
-    """Yield what engines get wrong on each surface: nominal, and identified on it."""
+@dataclass(frozen=True, eq=False)
+class BySurface(Step[Measurements]):
+    """Measurements with a condition for each surface, and one for all surfaces."""
+
+    own: JoinFolds  # by models of one surface
+    for_all: JoinFolds  # by models of all surfaces
+    pushes: Given
+
+    @property
+    def name(self) -> str:
+        """The pushes."""
+        return self.pushes.name
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the measurements of both kinds of models."""
+        for_all = without_predictions(runner.result(self.for_all))
+        whole = add_models(runner.result(self.own), for_all)
+        surfaces = surfaces_of(self.pushes.store)
+        names = sorted(surfaces)
+        places = np.empty(self.pushes.store.info.pushes, np.int32)
+        for name, rows in surfaces.items():
+            places[rows] = names.index(name)
+        own = (Condition(label=name, factors={"surface": name}) for name in names)
+        everywhere = Condition(label=_EVERYWHERE, parts=tuple(names))
+        return whole.in_conditions((*own, everywhere), places)
+
+
+@dataclass(frozen=True, eq=False)
+class EndErrors(Step[EndOffsets]):
+    """Signed errors of an engine at the ends of pushes."""
+
+    model: Step[Model]
+    pushes: Given
+
+    @property
+    def name(self) -> str:
+        """The engine."""
+        return self.model.name
+
+    def run(self, runner: "Runner") -> EndOffsets:
+        """Return the errors."""
+        return end_offsets(runner.result(self.model), self.pushes.store)
+
+
+def _plan(scope: Scope) -> Plan:
+    """Return models that are tuned, trained and identified on each fold."""
+    store, scale = scope.recorded_pushes(), scope.scale
+    own_folds, own, every = [], [], []
+    engine_errors: dict[str, Step[EndOffsets]] = {}
     for surface, rows in surfaces_of(store).items():
+        for fold in make_folds(store, FOLDS[scale], rows):
+            tuner = Tuner(fold.training, scale)
+            models = (*tuner.physics(), *map(tuner.model, VARIANTS))
+            own_folds.append(fold)
+            own.append(tuner.compare(models, fold.tests))
         pushes = store.take(rows)
-        tuner = Tuner(pushes, f"{surface}/whole", scale, chain)
-        for engine, model in zip(("", ", identified"), tuner.physics(), strict=True):
-            yield f"{surface}{engine}", end_offsets(model, pushes)
+        for engine, model in zip(
+            ("", ", identified"), Tuner(pushes, scale).physics(), strict=True
+        ):
+            engine_errors[f"{surface}{engine}"] = EndErrors(model, given(pushes))
+    folds = make_folds(store, FOLDS[scale])
+    for fold in folds:
+        tuner = Tuner(fold.training, scale)
+        models = [tuner.model(variant, "for-all") for variant in FOR_ALL]
+        every.append(tuner.compare(models, fold.tests))
+    whole = BySurface(
+        JoinFolds(tuple(own), tuple(own_folds)),
+        JoinFolds(tuple(every), tuple(folds)),
+        given(store),
+    )
+    joined = Join((whole, *_elsewhere(scope, store)))
+    return Plan(joined, engine_errors=engine_errors)
 
 
-def _by_surface(fold: Fold, surface: str, scale: Scale, chain: Chain) -> Measurements:
-    """Return the errors of models that were made for one surface."""
-    tuner = Tuner(fold.training, f"{surface}/fold-{fold.number}", scale, chain)
-    return chain.compare([*tuner.physics(), *tuner.models(VARIANTS)], fold.tests)
+def _elsewhere(scope: Scope, store: Store) -> Iterator[Evaluate]:
+    """Yield models of one surface on another: trained without its pushes, with few.
 
-
-def _for_all(fold: Fold, scale: Scale, chain: Chain) -> Measurements:
-    """Return the errors of models that were made for all surfaces at once."""
-    tuner = Tuner(fold.training, f"every-surface/fold-{fold.number}", scale, chain)
-    models = [
-        replace(model, id=identity_named(f"{model.name}-for-all"))
-        for model in tuner.models(FOR_ALL)
-    ]
-    return chain.compare(models, fold.tests)
-
-
-def _with_surfaces(whole: Measurements, store: Store) -> Measurements:
-    """Return measurements with a condition for each surface, and one for all."""
-    surfaces = surfaces_of(store)
-    names = sorted(surfaces)
-    places = np.empty(store.info.pushes, np.int32)
-    for name, rows in surfaces.items():
-        places[rows] = names.index(name)
-    conditions = [Condition(label=name, factors={"surface": name}) for name in names]
-    everywhere = Condition(label=_EVERYWHERE, parts=tuple(names))
-    return whole.in_conditions((*conditions, everywhere), places)
-
-
-def _elsewhere(store: Store, scale: Scale, chain: Chain) -> Iterator[Measurements]:
-    """Yield what models of one surface do on another: without any push of it, with few.
-
-    Both are tested on the same pushes, those that neither has seen.
+    Both are tested on the same pushes, on which neither was trained.
     """
     surfaces = surfaces_of(store)
     if not {_FROM, _TO} <= surfaces.keys():
         return
     few, tests = _few(store, surfaces[_TO])
     for count, rows in ((0, surfaces[_FROM]), (FEW, np.append(surfaces[_FROM], few))):
-        folder = f"{_FROM}-to-{_TO}-with-{count}"
-        tuner = Tuner(store.take(rows), folder, scale, chain)
-        models = [*tuner.physics(), *tuner.models(ELSEWHERE)]
-        found = chain.compare(models, store.take(tests))
+        tuner = Tuner(store.take(rows), scope.scale)
+        models = (*tuner.physics(), *map(tuner.model, ELSEWHERE))
         label = f"{_FROM} to {_TO}, {count} of it"
         factors = {"surface": _TO, "trained_on": _FROM, "training_pushes": count}
-        yield found.in_condition(Condition(label=label, factors=factors))
+        condition = Condition(label=label, factors=factors)
+        yield Evaluate(models, given(store.take(tests)), condition)
 
 
 def _few(store: Store, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -163,3 +181,12 @@ def _few(store: Store, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     few = order[: min(FEW, len(rows) // 2)]
     seen = np.isin(repeats, repeats[few])
     return rows[few], rows[~seen]
+
+
+STUDY = Study(
+    question="On recorded pushes, is identifying the engine enough, or does learning "
+    "err less?",
+    plan=_plan,
+    needs=(RECORDED,),
+    subject=SUBJECT,
+)

@@ -1,21 +1,25 @@
 """Robustness to wrong properties and unseen conditions."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
 
+from sainet.datasets.config import GenerateConfig
 from sainet.datasets.derive import derive
+from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
 from sainet.evaluation.conditions import Condition
-from sainet.evaluation.joining import join
-from sainet.evaluation.summary import summarise
 from sainet.scenes.geometry import wrap_angle
-from sainet.studies.chain import Chain
-from sainet.studies.config import Scale
-from sainet.studies.paper_setup import NETWORKS, PaperSetup, paper_setup
+from sainet.studies.paper_setup import NETWORKS, PaperSetup
 from sainet.studies.paper_tables import SEEDS
-from sainet.studies.result import Result
+from sainet.studies.steps import Join, Step
+from sainet.studies.study import Plan, Scope, Study
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 PERCENT_WRONG = (2, 5, 10)
 SPEEDS_MM_S = (25.0, 100.0)
@@ -25,70 +29,58 @@ CONTACT_DEG, DIRECTION_DEG = 75.0, 45.0
 _SEED = 11
 
 
-def run(scale: Scale, chain: Chain) -> Result:
-    """Return a table of the networks of Table III on unseen conditions."""
-    setup = paper_setup("robot", scale, chain)
-    trainings = setup.train(NETWORKS, SEEDS[scale])
-    found = join(
-        [
-            setup.compare(trainings, tests, condition=condition)
-            for condition, tests in _test_sets(setup)
-        ]
-    )
-    return chain.finish(Result(summary=summarise(found)), measurements=found)
+@dataclass(frozen=True, eq=False)
+class WrongProperties(Step[Store]):
+    """The same pushes with every mass and radius too large or too small."""
 
+    pushes: Step[Store]
+    percent: int
 
-def _test_sets(setup: PaperSetup) -> Iterator[tuple[Condition, Store]]:
-    def condition(label: str, **factors: float | str) -> Condition:
-        return Condition(label=label, factors=factors)
+    @property
+    def name(self) -> str:
+        """The size of the errors."""
+        return f"{self.pushes.name}-properties-{self.percent}-percent"
 
-    usual = setup.test_pushes()
-    yield condition("as trained"), usual
-    for percent in PERCENT_WRONG:
-        named = condition(f"properties ±{percent} %", percent_wrong=percent)
-        yield named, _misread(setup, usual, percent)
-    yield condition("angles outside", angles="outside"), _outside_angles(setup)
-    for speed in SPEEDS_MM_S:
-        named = condition(f"{speed:g} mm/s", speed_mm_s=speed)
-        name = f"test-{speed:g}-mm-s"
-        yield named, setup.test_pushes(name, speed_mm_s=(speed,))
-    named = condition(f"{GAP_MM:g} mm apart", gap_mm=GAP_MM)
-    yield named, setup.test_pushes(f"test-{GAP_MM:g}-mm-apart", gap_mm=GAP_MM)
+    def run(self, runner: "Runner") -> Store:
+        """Return the dataset, made where that is unfinished."""
+        settings = {"properties_wrong_percent": self.percent}
+        store = runner.result(self.pushes)
+        return derive(store, runner.folder(self), settings, self._change)
 
-
-def _misread(setup: PaperSetup, usual: Store, percent: int) -> Store:
-    """Return the test pushes with every mass and radius too large or too small."""
-
-    def change(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _change(self, arrays: Arrays) -> Arrays:
         rng = np.random.default_rng(_SEED)
         wrong = {
             name: arrays[name]
-            * (1 + percent / 100 * rng.choice([-1, 1], arrays[name].shape))
+            * (1 + self.percent / 100 * rng.choice([-1, 1], arrays[name].shape))
             for name in ("mass", "radius")
         }
         return arrays | wrong
 
-    out = setup.chain.out / f"test-properties-{percent}-percent"
-    return derive(usual, out, {"properties_wrong_percent": percent}, change)
 
+@dataclass(frozen=True, eq=False)
+class OutsideAngles(Step[Store]):
+    """The pushes outside the training range of angles."""
 
-def _outside_angles(setup: PaperSetup) -> Store:
-    """Return pushes outside the training range, from a wider distribution."""
-    wide = setup.test_pushes(
-        "test-wide-angles", contact_angle_deg=CONTACT_DEG, direction_deg=DIRECTION_DEG
-    )
+    pushes: Step[Store]
 
-    def change(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    @property
+    def name(self) -> str:
+        """The pushes."""
+        return f"{self.pushes.name}-outside"
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the dataset, made where that is unfinished."""
+        store = runner.result(self.pushes)
+        return derive(store, runner.folder(self), {"kept": "outside"}, self._change)
+
+    @staticmethod
+    def _change(arrays: Arrays) -> Arrays:
         contact, heading = push_angles(arrays)
         kept = (contact > np.deg2rad(60)) | (heading > np.deg2rad(30))
         return {name: array[kept] for name, array in arrays.items()}
 
-    return derive(
-        wide, setup.chain.out / "test-outside-angles", {"kept": "outside"}, change
-    )
 
-
-def push_angles(arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def push_angles(arrays: Arrays) -> tuple[np.ndarray, np.ndarray]:
     """Return absolute contact angles and push directions of stored pushes (rad)."""
     place = arrays["initial"][:, :, :2]
     normal = place[:, 0] - arrays["initial_pusher"]
@@ -97,3 +89,40 @@ def push_angles(arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     angles = [np.arctan2(*vector[:, ::-1].T) for vector in (axis, normal, way)]
     contact, heading = np.abs(wrap_angle(jnp.asarray(np.diff(angles, axis=0))))
     return contact, heading
+
+
+def _plan(scope: Scope) -> Plan:
+    """Return the networks of Table III on unseen conditions."""
+    paper = PaperSetup("robot", scope.scale)
+    networks = paper.train(NETWORKS, SEEDS[scope.scale])
+    sets = unseen_sets(paper)
+    return Plan(Join(tuple(paper.compare(networks, *each) for each in sets)))
+
+
+def unseen_sets(paper: PaperSetup) -> Iterator[tuple[Step[Store], Condition]]:
+    """Yield test pushes and their condition."""
+
+    def condition(label: str, **factors: float | str) -> Condition:
+        return Condition(label=label, factors=factors)
+
+    usual = paper.test_pushes()
+    yield usual, condition("as trained")
+    for percent in PERCENT_WRONG:
+        named = condition(f"properties ±{percent} %", percent_wrong=percent)
+        yield WrongProperties(usual, percent), named
+    wide = GenerateConfig(contact_angle_deg=CONTACT_DEG, direction_deg=DIRECTION_DEG)
+    angles = OutsideAngles(paper.test_pushes("test-wide-angles", wide))
+    yield angles, condition("angles outside", angles="outside")
+    for speed in SPEEDS_MM_S:
+        config = GenerateConfig(speed_mm_s=(speed,))
+        named = condition(f"{speed:g} mm/s", speed_mm_s=speed)
+        yield paper.test_pushes(f"test-{speed:g}-mm-s", config), named
+    apart = f"{GAP_MM:g} mm apart"
+    config = GenerateConfig(gap_mm=GAP_MM)
+    yield paper.test_pushes(f"test-{apart}", config), condition(apart, gap_mm=GAP_MM)
+
+
+STUDY = Study(
+    question="How robust are models to wrong properties and unseen conditions?",
+    plan=_plan,
+)

@@ -13,7 +13,7 @@ from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST
-from sainet.studies.result import TABLE, Result
+from sainet.studies.study import TABLE, Result
 
 _EPISODES = 6  # that play
 # The figures that commands leave in their folders, and what one sees there.
@@ -78,7 +78,7 @@ def page_of(folder: Path) -> str:
         return to_page(report_of(folder))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
         raise BadInput(
-            f"{folder}: what is in there is damaged or of another program "
+            f"{folder}: its contents are damaged or of another program "
             f"({type(error).__name__}: {error}); make it again."
         ) from error
 
@@ -115,4 +115,4 @@ def _way_out(folder: Path) -> str:
     """Name folders in it that have something to show."""
     known = sorted(path.parent for path in folder.glob(f"*/{TABLE}"))
     known += sorted(path.parent for path in folder.glob(f"*/{CARD}"))
-    return f"; give {known[0]}, say" if known else ""
+    return f"; give, for example, {known[0]}" if known else ""

@@ -1,7 +1,7 @@
 """Surrogate robots: simulated robots with injected errors, for choosing settings.
 
 Disk and pushes match the recorded ones, but are simulated with three times the usual
-noise (without tracking error, see `strokes`), at all headings, and only their final
+noise (without tracking error), at all headings, and only their final
 poses are observed. Final poses scatter as widely as those of repeated recorded pushes.
 Most of the scatter comes from the table: a smooth random function of position, heading
 and the side of the disk. The rest is random, and one recording in twenty fails: its
@@ -15,19 +15,40 @@ contact angle.
 """
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 from scipy.special import j0
 
+from sainet.datasets.config import GenerateConfig
 from sainet.datasets.derive import derive
 from sainet.datasets.predictions import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
 from sainet.engines.simulator import simulator_named
-from sainet.studies.chain import Chain
-from sainet.studies.strokes import STROKES
+from sainet.worlds.noise_config import NoiseConfig
 
+# Simulated pushes like the recorded ones, which last up to 5 s: 50 mm of one disk. The
+# disk has the properties of the recorded disk, which are also the assumed properties:
+# other disks would teach a network to correct an engine that is right. The recorded
+# directions go to 80 degrees, and the pusher starts a millimetre away. The pusher has
+# no tracking error: that of the simulated robot (0.2 mm, 0.1 s) has a velocity of about
+# 14 mm/s, which hardly affects a push at 50 mm/s, but at 10 mm/s breaks the friction
+# and halves the rotation of the disk.
+LONG_PUSHES = GenerateConfig(
+    disks=1,
+    pushes=2000,
+    engine="planar",
+    mass_kg=(0.85, 0.95),
+    radius_mm=(52.5,),
+    stroke_mm=(50.0,),
+    speed_mm_s=(10.0, 50.0),
+    direction_deg=80.0,
+    gap_mm=1.0,
+    hold_steps=40,
+    noise=NoiseConfig(tracking_mm=0.0),
+)
 _FRICTION = 0.4  # of contact
 _ENGINE = "planar"
 _SPREAD = 0.028  # m, standard deviation of positions on the table, per axis
@@ -65,30 +86,29 @@ ROBOTS = (
 )
 
 
-def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) -> Store:
-    """Return the recorded pushes of a robot.
+def simulated_pushes(pushes: int, seed: int) -> GenerateConfig:
+    """Return the settings of the pushes that all robots execute."""
+    return replace(
+        LONG_PUSHES,
+        pushes=pushes,
+        chunk_size=pushes,
+        seed=100 + seed,  # unlike the training pushes of shipped networks
+        contact_friction=(_FRICTION,),
+        speed_mm_s=(20.0,),
+        hold_steps=0,
+        noise_level="paper-like",
+    )
+
+
+def record(robot: Robot, made: Store, out: Path, *, is_test: bool) -> Store:
+    """Return the recorded pushes of a robot, as a dataset; written once.
 
     Args:
         robot: the surrogate robot.
-        name: of the dataset; `tests` has no random errors and no failures.
-        pushes: number of pushes.
-        seed: of the pushes and the failures.
-        chain: owner of the folder for datasets.
+        made: its pushes (`simulated_pushes`).
+        out: the run folder.
+        is_test: whether to leave out random errors and failures.
     """
-    made = chain.simulate(
-        f"{name}-simulated",
-        replace(
-            STROKES,
-            pushes=pushes,
-            chunk_size=pushes,
-            seed=100 + seed,  # unlike the training pushes of shipped networks
-            contact_friction=(_FRICTION,),
-            speed_mm_s=(20.0,),
-            hold_steps=0,
-            noise_level="paper-like",
-        ),
-    )
-    is_test = name == "tests"
     settings = {
         "assumed_friction": robot.assumed_friction,
         "observed": "ends",
@@ -104,7 +124,7 @@ def recordings(robot: Robot, name: str, pushes: int, seed: int, chain: Chain) ->
     }
     return derive(
         made,
-        chain.out / f"{name}-{robot.name}",
+        out,
         settings,
         lambda arrays: _as_recorded(arrays, made.info, robot, is_test=is_test),
     )

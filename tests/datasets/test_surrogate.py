@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
+from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
-from sainet.studies.surrogate import (
+from sainet.datasets.surrogate import (
     ROBOTS,
     Robot,
     of_the_table,
     placed,
-    recordings,
+    record,
+    simulated_pushes,
     unexplained,
 )
 
@@ -144,21 +146,23 @@ def test_robots_differ():
 
 
 @pytest.mark.slow
-def test_only_final_poses_of_recordings_are_observed(chain):
+def test_only_final_poses_of_recordings_are_observed(tmp_path):
     robot = Robot("wrong", assumed_friction=0.25, unexplained=0)
     right = Robot("right")
-    stores = {
-        (each.name, name): recordings(each, name, 20, seed, chain).read(slice(None))
-        for each in (robot, right)
-        for seed, name in enumerate(("training", "tests"))
-    }
+    stores = {}
+    for seed, name in enumerate(("training", "tests")):
+        simulated = generate(simulated_pushes(20, seed), tmp_path / name)
+        for each in (robot, right):
+            out = tmp_path / f"{name}-{each.name}"
+            made = record(each, simulated, out, is_test=name == "tests")
+            stores[each.name, name] = made.read(slice(None))
     tests, told = stores["wrong", "tests"], stores["right", "tests"]
     assert tests["pose_observed"].sum(axis=1).tolist() == [1] * 20
     last = tests["pose_observed"][np.arange(20), tests["steps"] - 1]
     assert last.tolist() == [1] * 20
     assert set(tests["pusher_friction"].tolist()) == {0.25}
     # No parameter explains the deviation of the truth.
-    went = open_store(chain.out / "tests-simulated")
+    went = open_store(tmp_path / "tests")
     went = placed(went.read(slice(None)), went.info.seed)
     table, rest = of_the_table(went), unexplained(went, 0)
     for seen, wanted in ((told, table), (tests, table + rest)):

@@ -1,0 +1,143 @@
+"""Runs the steps of studies in order, each once, and reports their progress."""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from graphlib import TopologicalSorter
+from pathlib import Path
+from typing import Any, TypeVar
+
+from sainet.learning.log import read_log
+from sainet.runs.workers import worker_lost
+from sainet.studies.steps import Step, Train
+
+_LOOK_AGAIN = 1.0  # s
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Progress:
+    """An event: how much of a step is done."""
+
+    title: str
+    done: int
+    total: int
+    note: str = ""
+    has_ended: bool = False  # no further event of this step
+
+
+Report = Callable[[Progress], None]
+
+
+@dataclass
+class Bar:
+    """Counts what is done of one step, and reports it."""
+
+    title: str
+    total: int
+    report: Report
+    done: int = 0
+    note: str = ""
+
+    def add(self, amount: int, note: str = "") -> None:
+        """Report so much more."""
+        self.reach(self.done + amount, note)
+
+    def reach(self, done: int, note: str = "") -> None:
+        """Report that so much is done in all."""
+        self.done, self.note = done, note
+        self.report(Progress(self.title, done, self.total, note))
+
+
+@dataclass
+class Runner:
+    """Runs steps in the order of their inputs; finished ones are not repeated."""
+
+    out: Path  # of all run folders
+    executor: Executor | None = None  # simulates and runs episodes; None: this process
+    report: Report = lambda event: None  # noqa: E731
+    trainers: Executor | None = None  # trains networks at once; None: one by one
+    _results: dict[str, Any] = field(default_factory=dict)
+
+    def folder(self, step: Step[Any]) -> Path:
+        """Return the run folder of a step."""
+        return self.out / step.folder_name
+
+    def result(self, step: Step[T]) -> T:
+        """Return the result of a step, which is run first if it was not.
+
+        Raises:
+            SainetError: whatever the step raises.
+        """
+        if step.key not in self._results:
+            self._run(step)
+        return self._results[step.key]
+
+    @contextmanager
+    def bar(self, title: str, total: int) -> Iterator[Bar]:
+        """Report the beginning and the end of some work, and what is between."""
+        bar = Bar(title, total, self.report)
+        bar.reach(0)
+        yield bar
+        self.report(Progress(title, total, total, bar.note, has_ended=True))
+
+    def _run(self, last: Step[Any]) -> None:
+        """Run a step after all that it needs, directly or not."""
+        steps: dict[str, Step[Any]] = {last.key: last}
+        order: TopologicalSorter[str] = TopologicalSorter()
+        for step in (waiting := [last]):
+            needed = [each for each in step.inputs if each.key not in self._results]
+            order.add(step.key, *(each.key for each in needed))
+            waiting += [each for each in needed if each.key not in steps]
+            steps |= {each.key: each for each in needed}
+        order.prepare()
+        while order.is_active():
+            ready = order.get_ready()
+            self._train([s for k in ready if isinstance(s := steps[k], Train)])
+            for key in ready:
+                self._results[key] = steps[key].run(self)
+            order.done(*ready)
+
+    def _train(self, steps: Sequence[Train]) -> None:
+        """Train several networks at once; finished ones and a single one need no pool.
+
+        A batch that is split over cores waits for the slowest of them at every
+        iteration. Networks that do not depend on each other never wait.
+
+        Raises:
+            SainetError: what `fit` raises, of the first that fails; or a process was
+                ended from outside.
+        """
+        left = [step for step in steps if not step.is_finished(self)]
+        if self.trainers is None or left == left[:1]:
+            return
+        total = sum(step.iterations for step in left)
+        futures: dict[Future[Any], Train] = {}
+        try:
+            with self.bar(f"Training {len(left)} networks", total) as bar:
+                for step in left:
+                    futures[self.trainers.submit(step.fitting(self))] = step
+                waiting = set(futures)
+                while waiting:
+                    done, waiting = wait(waiting, _LOOK_AGAIN, FIRST_COMPLETED)
+                    for future in done:
+                        future.result()
+                    bar.reach(*self._look(futures))
+        except BrokenProcessPool:
+            raise worker_lost() from None
+        finally:
+            for future in futures:
+                future.cancel()
+
+    def _look(self, futures: dict[Future[Any], Train]) -> tuple[int, str]:
+        """Return the iterations so far, and the losses of those under way."""
+        total, losses = 0, []
+        for future, step in futures.items():
+            if future.done():
+                total += step.iterations
+            elif lines := read_log(self.folder(step)):
+                total += int(lines[-1]["iteration"])
+                losses.append(f"{lines[-1]['loss']:.3g}")
+        return total, f"losses {', '.join(losses)}" if losses else ""

@@ -1,0 +1,338 @@
+"""Steps of studies: frozen settings and inputs, whose hash names the run folder."""
+
+import abc
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from msgspec import structs
+
+from sainet.control.config import ControlConfig
+from sainet.control.measure import measure_trials
+from sainet.control.trials import run_trials
+from sainet.datasets.bystander import add_bystander
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate
+from sainet.datasets.store import Store
+from sainet.evaluation.conditions import Condition
+from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.joining import join, pool_trainings
+from sainet.evaluation.measurements import Measurements
+from sainet.identification.identify import identify_into
+from sainet.learning.fit import FitResult, fit
+from sainet.learning.log import loss_note
+from sainet.learning.recipes import FromModel, Recipe
+from sainet.models.card import CARD
+from sainet.models.identity import ModelId
+from sainet.models.library import Model, load_model
+from sainet.runs.documents import content_hash
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
+
+T = TypeVar("T")
+_DIGEST = 10  # characters of a hash in the name of a folder
+
+
+@dataclass(frozen=True, eq=False)
+class Step(abc.ABC, Generic[T]):
+    """A piece of work: equal settings and inputs make one step, run once."""
+
+    @property
+    @abc.abstractmethod
+    def name(self) -> str:
+        """What the step makes, for progress and the name of its folder."""
+
+    @abc.abstractmethod
+    def run(self, runner: "Runner") -> T:
+        """Return the result; `runner` has those of all inputs."""
+
+    @cached_property
+    def key(self) -> str:
+        """The hash of all settings and inputs."""
+        # The representation of a dataclass names its type and contains every field.
+        return content_hash(repr(self).encode())[:_DIGEST]
+
+    @property
+    def inputs(self) -> Iterator["Step[Any]"]:
+        """The steps among the fields."""
+        for each in fields(self):
+            value = getattr(self, each.name)
+            for part in value if isinstance(value, tuple) else (value,):
+                if isinstance(part, Step):
+                    yield part
+
+    @property
+    def folder_name(self) -> str:
+        """The name of the run folder."""
+        words = "".join(c if c.isalnum() or c in ".-" else " " for c in self.name)
+        return "-".join([*words.split(), self.key])
+
+
+@dataclass(frozen=True, eq=False)
+class Given(Step[Store]):
+    """Pushes that exist before the study begins."""
+
+    store: Store = field(repr=False)
+    content: str  # hash of the pushes
+
+    @property
+    def name(self) -> str:
+        """The folder of the dataset."""
+        return str(self.store.path)
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the pushes."""
+        return self.store
+
+
+def given(store: Store) -> Given:
+    """Return existing pushes as a step."""
+    return Given(store, store.content)
+
+
+@dataclass(frozen=True, eq=False)
+class Simulate(Step[Store]):
+    """A simulated dataset."""
+
+    label: str
+    config: GenerateConfig
+
+    @property
+    def name(self) -> str:
+        """The label."""
+        return self.label
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the dataset, simulated where that is unfinished."""
+        with runner.bar(f"Simulating {self.name}", self.config.pushes) as bar:
+            return generate(
+                self.config,
+                runner.folder(self),
+                executor=runner.executor,
+                on_pushes=bar.add,
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class First(Step[Store]):
+    """The first pushes of a dataset."""
+
+    pushes: Step[Store]
+    count: int
+
+    @property
+    def name(self) -> str:
+        """How many of which."""
+        return f"{self.count} of {self.pushes.name}"
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the pushes."""
+        return runner.result(self.pushes).first(self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class WithBystander(Step[Store]):
+    """The same pushes, beside each a disk that nothing touches."""
+
+    pushes: Step[Store]
+
+    @property
+    def name(self) -> str:
+        """The pushes and the bystander."""
+        return f"{self.pushes.name}-bystander"
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the dataset, predicted where that is unfinished."""
+        store = runner.result(self.pushes)
+        total = store.info.pushes * len(store.info.assumed_engines)
+        with runner.bar(f"Predicting {self.name}", total) as bar:
+            return add_bystander(store, runner.folder(self), on_pushes=bar.add)
+
+
+@dataclass(frozen=True, eq=False)
+class Load(Step[Model]):
+    """A model that needs no training: physics or a shipped network."""
+
+    id: ModelId
+    source: str  # name of the model
+    engine: str | None = None  # inside; None: its own
+
+    @property
+    def name(self) -> str:
+        """The name in tables."""
+        return self.id.slug
+
+    def run(self, runner: "Runner") -> Model:
+        """Return the model."""
+        return replace(load_model(self.source, engine=self.engine), id=self.id)
+
+
+@dataclass(frozen=True, eq=False)
+class Identify(Step[Model]):
+    """Physics with parameters identified on pushes."""
+
+    id: ModelId
+    pushes: Step[Store]
+
+    @property
+    def name(self) -> str:
+        """The name in tables."""
+        return self.id.slug
+
+    def run(self, runner: "Runner") -> Model:
+        """Return the model, identified where that is unfinished."""
+        folder = runner.folder(self)
+        identify_into(runner.result(self.pushes), folder)
+        return replace(load_model(str(folder)), id=self.id)
+
+
+@dataclass(frozen=True, eq=False)
+class Train(Step[Model]):
+    """One training run of a network."""
+
+    id: ModelId  # in tables; its simulator is the internal engine
+    pushes: Step[Store]
+    recipe: Recipe
+    identified: Identify | None = None  # the internal engine, instead
+    start: "Train | None" = None  # the network that training starts from
+
+    @property
+    def name(self) -> str:
+        """The name in tables, and the seed."""
+        return f"{self.id.slug}-seed-{self.recipe.seed}"
+
+    @property
+    def iterations(self) -> int:
+        """The number of its iterations."""
+        return self.recipe.optimiser.iterations
+
+    def is_finished(self, runner: "Runner") -> bool:
+        """Return whether the folder has a network; `run` checks which."""
+        return (runner.folder(self) / CARD).is_file()
+
+    def fitting(self, runner: "Runner") -> "partial[FitResult]":
+        """Return the call that trains the network, which another process can make."""
+        recipe = self.recipe
+        if self.start is not None:
+            start = FromModel(str(runner.folder(self.start)))
+            recipe = recipe.changed(start=start)
+        engine = self.id.simulator.slug if self.id.simulator else "planar"
+        if self.identified is not None:
+            engine = str(runner.folder(self.identified))
+        return partial(
+            fit,
+            "in" if self.id.kind == "in" else "sain",
+            runner.result(self.pushes),
+            recipe,
+            runner.folder(self),
+            assumed_engine=engine,
+        )
+
+    def run(self, runner: "Runner") -> Model:
+        """Return the network, trained where that is unfinished."""
+        with runner.bar(f"Training {self.name}", self.iterations) as bar:
+            result = self.fitting(runner)(
+                on_step=lambda done, loss: bar.reach(done, loss_note(loss))
+            )
+            last = result.history[-1]["loss"] if result.history else None
+            bar.reach(self.iterations, loss_note(last))
+        return replace(load_model(str(runner.folder(self))), id=self.id)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluate(Step[Measurements]):
+    """Errors of models on the same pushes.
+
+    Models of one identity are training runs of one network.
+    """
+
+    models: tuple[Step[Model], ...]
+    pushes: Step[Store]
+    condition: Condition | None = None
+    steps: int | None = None  # as of `evaluate`
+
+    @property
+    def name(self) -> str:
+        """The pushes."""
+        return self.pushes.name
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the errors."""
+        store = runner.result(self.pushes)
+        models = [runner.result(model) for model in self.models]
+        runs: Counter[ModelId] = Counter()
+        pools: dict[ModelId, list[str]] = {}
+        for number, model in enumerate(models):
+            runs[model.id] += 1
+            name = f"{model.name}, training run {runs[model.id]}"
+            if [each.id for each in models].count(model.id) > 1:
+                own = structs.replace(model.id, name=name)
+                models[number] = replace(model, id=own)
+                pools.setdefault(model.id, []).append(name)
+        with runner.bar("Predicting", len(models) * store.info.pushes) as bar:
+            found = evaluate(
+                models,
+                store,
+                steps=self.steps,
+                on_pushes=lambda model, pushes: bar.add(pushes, model),
+            )
+        found = pool_trainings(found, pools)
+        return found if self.condition is None else found.in_condition(self.condition)
+
+
+@dataclass(frozen=True, eq=False)
+class RunTrials(Step[Measurements]):
+    """Control trials of models on the same goals."""
+
+    models: tuple[ModelId, ...]  # shipped
+    config: ControlConfig  # of every model
+    condition: Condition
+
+    @property
+    def name(self) -> str:
+        """The condition."""
+        return self.condition.label
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the outcomes; finished episodes are kept."""
+        records = {}
+        for model in self.models:
+            config = replace(self.config, model=model.slug)
+            title = f"Pushing ({model.slug}, {self.name})"
+            with runner.bar(title, config.trials) as bar:
+                solved = Counter[bool]()
+
+                def on_episode(
+                    record: dict[str, Any],
+                    bar: Any = bar,  # noqa: ANN401
+                    solved: Counter[bool] = solved,
+                ) -> None:
+                    solved[record["solved"]] += 1
+                    bar.add(1, f"{solved[True]} solved")
+
+                records[model] = run_trials(
+                    config,
+                    runner.folder(self) / model.slug,
+                    executor=runner.executor,
+                    on_episode=on_episode,
+                )
+        return measure_trials(records, self.condition)
+
+
+@dataclass(frozen=True, eq=False)
+class Join(Step[Measurements]):
+    """Measurements of several conditions."""
+
+    parts: tuple[Step[Measurements], ...]
+
+    @property
+    def name(self) -> str:
+        """The number of conditions."""
+        return f"{len(self.parts)} conditions"
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the measurements of all parts, one after another."""
+        return join([runner.result(part) for part in self.parts])

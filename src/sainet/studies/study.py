@@ -1,0 +1,198 @@
+"""Studies: a question, the steps that answer it, and what is made of their results."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from sainet.datasets.store import Store, open_store
+from sainet.engines import make_engine
+from sainet.evaluation.as_json import to_json_object
+from sainet.evaluation.claims import Claim
+from sainet.evaluation.conditions import PublishedValues
+from sainet.evaluation.evaluate import EndOffsets
+from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.summary import Summary, summarise
+from sainet.models.card import CARD, WEIGHTS, read_card
+from sainet.report.figures.engine_errors import draw_engine_errors
+from sainet.runs.documents import write_bytes, write_document, write_json
+from sainet.runs.errors import BadInput
+from sainet.runs.folders import CONFIG
+from sainet.runs.manifest import MANIFEST, manifest
+from sainet.studies.config import Scale
+from sainet.studies.runner import Runner
+from sainet.studies.steps import Step, Train
+
+TABLE = "table.json"
+STEPS = "steps"  # folder of the run folders that studies share
+
+
+class Change(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Settings of a recipe that differ from its defaults; None: as in the recipe."""
+
+    features: str | None = None
+    learning_rate: float | None = None
+    iterations: int | None = None
+    halve_every: int | None = None
+    l2: float | None = None
+    linear_from: float | None = None
+    weight_rotation: float | None = None
+    mirror: bool | None = None
+    average: int | None = None
+    hold: int | None = None
+    validation_share: float | None = None
+    patience: int | None = None
+
+
+class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One setting that a study tried, and its score: errors over those of physics."""
+
+    score: float
+    l2: float | None = None
+    pushes: int | None = None
+    start: str | None = None
+    change: Change | None = None  # to the defaults
+    scores: dict[str, float] | None = None  # by robot
+
+
+class Result(msgspec.Struct, frozen=True, kw_only=True):
+    """The result of a study, as it is kept in its folder."""
+
+    summary: Summary
+    as_trained: Summary | None = None  # of pushes like those of the training
+    choices: tuple[Choice, ...] = ()
+
+    def to_json(self) -> Mapping[str, object]:
+        """Return the JSON object that commands print."""
+        found = to_json_object(self.summary)
+        if self.as_trained is not None:
+            found["as_trained"] = to_json_object(self.as_trained)
+        if self.choices:
+            found["choices"] = msgspec.to_builtins(self.choices)
+        return found
+
+
+class MissingInput(BadInput):
+    """A study without data that it needs."""
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the steps of a study depend on: its size and the recorded pushes."""
+
+    scale: Scale
+    recorded: Path | None = None  # dataset that 'sainet import' made
+
+    def recorded_pushes(self) -> Store:
+        """Return the recorded pushes.
+
+        Raises:
+            MissingInput: none were given.
+            BadStore: they cannot be used.
+        """
+        if self.recorded is None:
+            raise MissingInput(
+                "`recorded` is missing: give the dataset that 'sainet import "
+                "mitpush-endpoints' made of recorded pushes."
+            )
+        return open_store(self.recorded)
+
+
+Need = Callable[[Scope], object]  # raises what is missing
+
+
+def _bullet(scope: Scope) -> None:
+    make_engine("bullet")
+
+
+BULLET: Need = _bullet
+RECORDED: Need = Scope.recorded_pushes
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The steps of a study at one scale; their inputs are steps as well."""
+
+    measured: Step[Measurements]
+    as_trained: Step[Measurements] | None = None
+    engine_errors: Mapping[str, Step[EndOffsets]] = field(default_factory=dict)
+    networks: tuple[Train, ...] = ()  # copied into the folder of the study
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """A question, and how it is answered."""
+
+    question: str
+    plan: Callable[[Scope], Plan]
+    needs: tuple[Need, ...] = (BULLET,)
+    published: tuple[PublishedValues, ...] = ()
+    claims: tuple[Claim, ...] = ()
+    subject: str = ""  # slug of the model that all others are compared with
+    compares: bool = True  # models with each other, not only with the truth
+    choose: Callable[[Summary], tuple[Choice, ...]] = lambda summary: ()
+    figure: Callable[[Summary, Path], Path] | None = None
+    figure_name: str = ""
+
+    def check(self, scope: Scope) -> None:
+        """Raise the error of the first need that is not met.
+
+        Raises:
+            MissingExtra: a package is not installed.
+            MissingInput: no recorded pushes were given.
+            BadStore: the recorded pushes cannot be used.
+        """
+        for need in self.needs:
+            need(scope)
+
+    def summarise(self, measured: Measurements) -> Summary:
+        """Return the summary of measurements of this study."""
+        found = summarise(measured, subject=self.subject)
+        return (
+            found if self.compares else msgspec.structs.replace(found, comparisons=())
+        )
+
+    def run(self, scope: Scope, runner: Runner, out: Path) -> Result:
+        """Run the steps and write table, measurements, figures and origin.
+
+        Args:
+            scope: scale and recorded pushes.
+            runner: of the steps.
+            out: folder of the study.
+        """
+        plan = self.plan(scope)
+        measured = runner.result(plan.measured).with_published(self.published)
+        summary, as_trained = self.summarise(measured), None
+        measured.write(out / "measurements.nc")
+        if plan.as_trained is not None:
+            found = runner.result(plan.as_trained)
+            found.write(out / "as-trained.nc")
+            as_trained = self.summarise(found)
+        result = Result(
+            summary=summary, as_trained=as_trained, choices=self.choose(summary)
+        )
+        if self.figure is not None:
+            self.figure(summary, out / self.figure_name)
+        if plan.engine_errors:
+            cases = {k: runner.result(v) for k, v in plan.engine_errors.items()}
+            draw_engine_errors(cases, out / "engine-errors.svg")
+        for step in plan.networks:
+            _copy(runner.folder(step), out / "networks" / step.id.slug)
+        _write(result, scope, out)
+        return result
+
+
+def _write(result: Result, scope: Scope, out: Path) -> None:
+    made: dict[str, Any] = {"command": "reproduce", "study": out.name}
+    content = scope.recorded and open_store(scope.recorded).content
+    write_json(out / CONFIG, made | {"recorded": content})
+    write_json(out / MANIFEST, manifest())
+    write_document(out / TABLE, result)
+
+
+def _copy(folder: Path, target: Path) -> None:
+    """Copy the card and the weights of a network."""
+    write_bytes(target / WEIGHTS, (folder / WEIGHTS).read_bytes())
+    write_document(target / CARD, read_card(folder))
