@@ -1,10 +1,14 @@
-"""Verdicts on control trials: which models solve more goals, and by how much."""
+"""Verdicts: which models solve more goals, and whether errors rank as published."""
 
-from sainet.evaluation.conditions import Condition
+import pytest
+
+from report import samples
+from sainet.evaluation.claims import PUBLISHED_ORDER
+from sainet.evaluation.conditions import Condition, PublishedValues
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
-from sainet.models.identity import ModelId
-from sainet.report.verdicts import verdicts_on
+from sainet.models.identity import ModelId, identity_named
+from sainet.report.verdicts import beside_published, verdicts_on
 
 MODELS = {"physics": 16, "in": 2, "sain": 7}
 
@@ -63,3 +67,52 @@ def test_models_that_solve_more_are_named_with_their_numbers():
 
 def test_one_model_has_no_verdict():
     assert verdicts_on(summary([], models=("sain",))) == ()
+
+
+PAPER = {"physics": (6.0, 4.0), "in": (5.0, 3.0), "sain": (4.0, 2.0)}
+
+
+def tables(pairs, models=("physics", "in", "sain-bullet")):
+    """Return errors of models, compared as `pairs` give: difference by both slugs."""
+    errors = dict(zip(models, (3.0, 1.5, 1.0), strict=True))
+    rows = [
+        samples.row(model, body, error / 3.6)
+        for model, error in errors.items()
+        for body in (1, 2)
+    ]
+    published = tuple(
+        PublishedValues(
+            condition="", model=identity_named(model), values={"pos_mm": means}
+        )
+        for model, means in PAPER.items()
+    )
+    comparisons = tuple(samples.compared(*pair, value) for pair, value in pairs)
+    return samples.summary(rows, published=published, comparisons=comparisons)
+
+
+@pytest.mark.parametrize(
+    ("difference", "words"),
+    [
+        (-0.2, "Verdict: holds. Errors"),
+        (0.02, "SAIN around Bullet does not err less than IN in pos of disk 1 (not "),
+        (0.2, "SAIN around Bullet does not err less than IN in pos of disk 1 (clearly"),
+    ],
+)
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_errors_rank_as_published_or_the_exceptions_are_named(
+    difference, words, is_turned
+):
+    last = ("sain-bullet", "in"), difference
+    if is_turned:
+        last = ("in", "sain-bullet"), -difference
+    found = tables([(("in", "physics"), -1.0), last])
+    ruling = beside_published(found)
+    assert words in ruling
+    status = "holds" if difference < 0 else "does not hold"
+    verdict = PUBLISHED_ORDER.rule(found)
+    assert (verdict.status, len(verdict.comparisons)) == (status, 2)
+    assert "Physics pos 0.50 / 0.75; IN pos 0.30 / 0.50; " in ruling
+
+
+def test_without_published_errors_their_order_is_not_testable():
+    assert PUBLISHED_ORDER.rule(samples.summary([])).status == "not testable here"

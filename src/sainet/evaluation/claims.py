@@ -2,9 +2,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
-from sainet.evaluation.summary import BASELINE, Comparison, Factor, Summary
+from msgspec.structs import astuple, replace
+
+from sainet.evaluation.metrics import MEASURED
+from sainet.evaluation.summary import BASELINE, Comparison, Estimate, Factor, Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 from sainet.models.identity import ModelId
 
@@ -15,11 +19,17 @@ LEVEL = 1e-3  # relative difference below which two errors are the same
 
 @dataclass(frozen=True)
 class Verdict:
-    """The ruling on a claim, and the comparisons that it rests on."""
+    """The ruling on a claim.
+
+    Attributes:
+        status: the ruling.
+        comparisons: all comparisons that it rests on.
+        contradicting: those of them that contradict the claim.
+    """
 
     status: Status
     comparisons: tuple[Comparison, ...] = ()
-    tests: tuple[TrialTest, ...] = ()
+    contradicting: tuple[Comparison, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -30,51 +40,72 @@ class Claim:
     rule: Callable[[Summary], Verdict]
 
 
-def errs_less(
-    model: str, against: str, metrics: Sequence[str], *, condition: str = ""
-) -> Callable[[Summary], Verdict]:
-    """Return the rule that a model errs less: every interval lies below zero."""
-    return _all(model, against, metrics, condition, lambda each: _sign(each) < 0)
+def keeps_published_order(summary: Summary) -> Verdict:
+    """Return whether mean errors rank the models as the published means do.
+
+    Each error of each disk is ranked on its own. A comparison contradicts the order if
+    the model that errs less in the publication does not err less here, clearly or not.
+    """
+    found: list[Comparison] = []
+    for metric in MEASURED:
+        known = [each for each in summary.published if metric in each.values]
+        errors = {our_model(each.model, summary): each.values[metric] for each in known}
+        for body in range(min(map(len, errors.values()), default=0)):
+            places = {slug: values[body] for slug, values in errors.items()}
+            ranked = sorted(
+                (error, slug) for slug, error in places.items() if error is not None
+            )
+            for (_, less), (_, more) in pairwise(ranked):
+                pairs = compared(summary, less, more, "")
+                found += [e for e in pairs if (e.metric, e.body) == (metric, body + 1)]
+    wrong = tuple(each for each in found if (each.difference.value or 0) >= 0)
+    if not found:
+        return Verdict("not testable here")
+    return Verdict("does not hold" if wrong else "holds", tuple(found), wrong)
 
 
-def does_not_err_more(
-    model: str, against: str, metrics: Sequence[str], *, condition: str = ""
-) -> Callable[[Summary], Verdict]:
-    """Return the rule that a model does not err more: no interval lies above zero."""
-    return _all(model, against, metrics, condition, lambda each: _sign(each) <= 0)
+PUBLISHED_ORDER = Claim(
+    "mean errors rank as in the paper, SAIN below IN below Physics",
+    keeps_published_order,
+)
 
 
-def solves_alike(condition: str) -> Callable[[Summary], Verdict]:
-    """Return the rule that no two models differ in the goals that they solve."""
+def our_model(published: ModelId, summary: Summary) -> str:
+    """Return the slug of our model that corresponds to a published one.
 
-    def rule(summary: Summary) -> Verdict:
-        tests = _tests_of_solved(summary, condition)
-        if not tests:
-            return Verdict("not testable here")
-        alike = all(test.p >= CHANCE for test in tests)
-        return Verdict("holds" if alike else "does not hold", tests=tests)
+    The internal engine of the paper's SAIN is Bullet. A summary without such a model
+    has SAIN around another engine.
+    """
+    of_kind = [each for each in summary.models if each.kind == published.kind]
+    around = [e for e in of_kind if e.simulator and e.simulator.engine == "bullet"]
+    if published.kind == "sain" and around:
+        return around[0].slug
+    return published.slug
 
-    return rule
 
-
-def _all(
-    model: str,
-    against: str,
-    metrics: Sequence[str],
-    condition: str,
-    test: Callable[[Comparison], bool],
-) -> Callable[[Summary], Verdict]:
-    def rule(summary: Summary) -> Verdict:
-        found = tuple(
-            each
-            for each in compared(summary, model, against, condition)
-            if each.metric in metrics
+def over_published(
+    summary: Summary,
+) -> Iterator[tuple[str, dict[str, tuple[float, ...]]]]:
+    """Yield models with their errors over the published ones, by metric, by disk."""
+    for each in summary.published:
+        slug = our_model(each.model, summary)
+        errors = {
+            metric: summary.errors(slug, metric, each.condition)
+            for metric in MEASURED
+            if metric in each.values
+        }
+        yield (
+            slug,
+            {
+                metric: tuple(
+                    ours / theirs
+                    for ours, theirs in zip(values, each.values[metric], strict=True)
+                    if theirs
+                )
+                for metric, values in errors.items()
+                if values
+            },
         )
-        if not found or any(each.difference.low is None for each in found):
-            return Verdict("not testable here", found)
-        return Verdict("holds" if all(map(test, found)) else "does not hold", found)
-
-    return rule
 
 
 def compared(
@@ -85,9 +116,16 @@ def compared(
         names = each.condition, each.model, each.against
         if names == (condition, model, against):
             yield each
+        if names == (condition, against, model):
+            value, high, low = (
+                None if number is None else -number
+                for number in astuple(each.difference)
+            )
+            turned = Estimate(value, low, high)
+            yield replace(each, model=model, against=against, difference=turned)
 
 
-def _sign(comparison: Comparison) -> int:
+def sign(comparison: Comparison) -> int:
     """Return -1 or 1 where the interval lies below or above zero, else 0."""
     low, high = comparison.difference.low, comparison.difference.high
     if low is None or high is None:
@@ -114,10 +152,10 @@ def places(
     condition: str = "",
 ) -> Places:
     """Return where the interval of the paired difference leaves out zero."""
-    found = [e for e in compared(summary, model, against, condition)]
-    found = [each for each in found if each.metric in metrics]
-    better = tuple(each for each in found if _sign(each) < 0)
-    worse = tuple(each for each in found if _sign(each) > 0)
+    pairs = compared(summary, model, against, condition)
+    found = [each for each in pairs if each.metric in metrics]
+    better = tuple(each for each in found if sign(each) < 0)
+    worse = tuple(each for each in found if sign(each) > 0)
     return Places(model, against, better, worse)
 
 
@@ -126,11 +164,9 @@ class Comparative:
     """The best network of a condition beside the physics engine."""
 
     condition: str
-    unit: str
     best: Factor
     true_properties: Factor | None  # of the engine with true masses and radii
     alone: Factor | None  # of the network without an engine
-    is_network: bool
 
 
 def best_network(summary: Summary, condition: str) -> Comparative | None:
@@ -150,14 +186,11 @@ def best_network(summary: Summary, condition: str) -> Comparative | None:
     if not others:
         return None
     best = min(others, key=lambda each: each.error)
-    is_network = bool(networks)
     return Comparative(
         condition=condition,
-        unit="mm",
         best=best,
-        true_properties=true if is_network else None,
+        true_properties=true if networks else None,
         alone=by_model.get("in") if hybrids else None,
-        is_network=is_network,
     )
 
 

@@ -2,7 +2,15 @@
 
 from collections.abc import Sequence
 
-from sainet.evaluation.claims import Claim, Places, best_network, rank_models
+from sainet.evaluation.claims import (
+    PUBLISHED_ORDER,
+    Claim,
+    Places,
+    best_network,
+    over_published,
+    rank_models,
+    sign,
+)
 from sainet.evaluation.metrics import METRICS
 from sainet.evaluation.summary import Comparison, Summary
 from sainet.report.pages.templates import render_text
@@ -29,11 +37,28 @@ def verdicts_on(summary: Summary) -> tuple[str, ...]:
 
 
 def rulings(claims: Sequence[Claim], summary: Summary) -> tuple[str, ...]:
-    """Return each claim with its verdict."""
-    return tuple(
-        _worded("claim", claim=claim, status=claim.rule(summary).status)
-        for claim in claims
-    )
+    """Return each claim with its verdict, and the comparisons that contradict it."""
+    labels, found = labels_of(summary.models), []
+    for claim in claims:
+        verdict = claim.rule(summary)
+        pairs: dict[tuple[str, str], list[Comparison]] = {}
+        for each in verdict.contradicting:
+            pairs.setdefault((each.model, each.against), []).append(each)
+        wrong = [
+            (*pair, _where(e), _where([each for each in e if sign(each)]))
+            for pair, e in pairs.items()
+        ]
+        text = {"labels": labels, "claim": claim, "wrong": wrong}
+        found.append(_worded("claim", status=verdict.status, **text))
+    return tuple(found)
+
+
+def beside_published(summary: Summary) -> str:
+    """Return whether the published order of errors holds, and errors over published."""
+    (ruling,) = rulings([PUBLISHED_ORDER], summary)
+    labels, names = labels_of(summary.models), {k: m.name for k, m in METRICS.items()}
+    ratios = list(over_published(summary))
+    return f"{ruling} " + _worded("ratios", labels=labels, names=names, ratios=ratios)
 
 
 def worded_places(found: Places, summary: Summary) -> str:
@@ -49,14 +74,19 @@ def worded_places(found: Places, summary: Summary) -> str:
 
 
 def _where(found: Sequence[Comparison]) -> str:
-    """Return errors and disks: "pos of disks 1 and 2, rot of disk 1"."""
+    """Return errors and disks: "pos of disks 1, 2 and 3, rot of disk 1"."""
     bodies: dict[str, list[str]] = {}
     for each in found:
         bodies.setdefault(METRICS[each.metric].name, []).append(str(each.body))
     return ", ".join(
-        f"{name} of disk{'s' * (len(disks) > 1)} {' and '.join(disks)}"
+        f"{name} of disk{'s' * (len(disks) > 1)} {_listed(disks)}"
         for name, disks in bodies.items()
     )
+
+
+def _listed(words: Sequence[str]) -> str:
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _worded(kind: str, **values: object) -> str:

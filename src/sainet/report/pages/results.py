@@ -18,7 +18,7 @@ from sainet.evaluation.measurements import read_measurements
 from sainet.evaluation.summary import BASELINE, Summary, summarise
 from sainet.report.arrange import arrange
 from sainet.report.palette import labels_of
-from sainet.report.verdicts import worded_places
+from sainet.report.verdicts import beside_published, worded_places
 from sainet.report.writers import to_markdown
 from sainet.runs.documents import read_document, write_bytes
 
@@ -74,6 +74,7 @@ class Evidence:
             "table": lambda name: to_markdown(arrange(self.summary(name))),
             "origin": lambda name: origin(self.summary(name)),
             "ratios": lambda name: ratios(self.summary(name)),
+            "beside_paper": lambda name: beside_published(self.summary(name)),
             "readings": lambda name: readings(self.summary(name)),
             "plain": lambda name: plain(self.figures(name)),
             "errors": self._errors,
