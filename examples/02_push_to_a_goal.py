@@ -10,7 +10,7 @@ from sainet.planning import make_planner
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.state import at_rest
 from sainet.tasks.push_to_goal import PushToGoal
-from sainet.worlds.noise_config import NoiseConfig
+from sainet.worlds.noise import NoiseConfig
 from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
 

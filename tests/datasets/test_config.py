@@ -10,7 +10,7 @@ from sainet.cli.entry import run
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.errors import BadInput, BadSetting
 from sainet.worlds.config import bounds
-from sainet.worlds.noise_config import NoiseConfig
+from sainet.worlds.noise import NoiseConfig
 from support import SOURCE
 
 NAN, INFINITE = float("nan"), float("inf")

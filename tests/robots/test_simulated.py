@@ -12,7 +12,7 @@ from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.outcomes import roll_pushes
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.pushes import PushGrid
-from sainet.worlds.noise_config import NoiseConfig, at_level
+from sainet.worlds.noise import NoiseConfig, at_level
 from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
 

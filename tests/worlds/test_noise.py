@@ -8,13 +8,14 @@ import pytest
 
 from sainet.scenes.scene import TIME_STEP, FrictionField
 from sainet.worlds.noise import (
+    NoiseConfig,
+    at_level,
     capture_error,
     force_error,
     friction_features,
     ornstein_uhlenbeck,
     tracking_error,
 )
-from sainet.worlds.noise_config import NoiseConfig, at_level
 
 NOISE = NoiseConfig()
 

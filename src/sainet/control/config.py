@@ -11,7 +11,7 @@ from sainet.scenes.quantities import (
     MOST_DISKS,
     require_count,
 )
-from sainet.worlds.noise_config import NoiseLevel
+from sainet.worlds.noise import NoiseLevel
 
 Goals = Literal["easy", "hard"]
 Knowledge = Literal["true", "nominal"]

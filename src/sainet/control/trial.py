@@ -14,7 +14,7 @@ from sainet.scenes.state import State, at_rest
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
 from sainet.worlds.config import WorldConfig, bounds
-from sainet.worlds.noise_config import NoiseConfig, at_level
+from sainet.worlds.noise import NoiseConfig, at_level
 from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
 

@@ -18,7 +18,7 @@ from sainet.scenes.quantities import (
     Quantity,
     require_count,
 )
-from sainet.worlds.noise_config import NoiseConfig, NoiseLevel
+from sainet.worlds.noise import NoiseConfig, NoiseLevel
 
 SetupName = Literal["robot", "direct-force"]
 Range = tuple[float] | tuple[float, float]

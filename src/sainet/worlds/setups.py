@@ -13,8 +13,7 @@ from sainet.scenes.pushes import Push, command_force, command_path
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State
 from sainet.worlds.config import WorldConfig
-from sainet.worlds.noise import force_error, tracking_error
-from sainet.worlds.noise_config import NoiseConfig
+from sainet.worlds.noise import NoiseConfig, force_error, tracking_error
 
 _BUCKET = 40  # steps: pushes of nearly the same length share a compilation
 

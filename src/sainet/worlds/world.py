@@ -12,8 +12,7 @@ from sainet.engines.base import AbstractEngine, roll_out
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import FrictionField, Scene
 from sainet.scenes.state import State, Trajectory
-from sainet.worlds.noise import capture_error, friction_features
-from sainet.worlds.noise_config import NoiseConfig
+from sainet.worlds.noise import NoiseConfig, capture_error, friction_features
 from sainet.worlds.setups import AbstractSetup
 
 
