@@ -9,11 +9,16 @@ from msgspec import structs
 from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
 from sainet.datasets import bystander
-from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
+from sainet.datasets.batch import (
+    from_trajectory,
+    simulate,
+    to_controls,
+    to_initial,
+    to_scene,
+)
 from sainet.datasets.bystander import FARTHEST, add_bystander, with_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.datasets.predictions import simulate
 from sainet.datasets.schema import variables
 from sainet.datasets.store import open_store
 from sainet.engines import make_engine

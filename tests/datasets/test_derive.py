@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from learning.stores import info_of, made_up, write
-from sainet.datasets.derive import derive
 from sainet.datasets.store import open_store
+from sainet.datasets.writer import derive
 from sainet.runs.errors import RunConflict
 
 

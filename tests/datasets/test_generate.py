@@ -194,7 +194,7 @@ class LostEngine(PlanarEngine):
 
 
 def test_a_truth_of_nan_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("sainet.datasets.simulate.make_engine", lambda _: LostEngine())
+    monkeypatch.setattr("sainet.datasets.generate.make_engine", lambda _: LostEngine())
     with pytest.raises(Diverged, match="push 0 of the dataset: engine planar gave"):
         generate(small(pushes=7, noise_level="none"), tmp_path / "store")
 

@@ -7,8 +7,8 @@ import pytest
 
 from datasets.stores import small
 from sainet.datasets.batch import to_batch, to_controls, to_initial, to_scene
+from sainet.datasets.generate import simulate_chunk, store_info
 from sainet.datasets.schema import sizes, variables
-from sainet.datasets.simulate import simulate_chunk, store_info
 from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.scene import TIME_STEP
 from sainet.scenes.shapes import pair_gaps, pusher_gaps

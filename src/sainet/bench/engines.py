@@ -12,7 +12,7 @@ from sainet.bench import Figures
 from sainet.bench.timing import check_runs, median_seconds
 from sainet.datasets.batch import to_controls, to_initial, to_scene
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.simulate import simulate_chunk, store_info
+from sainet.datasets.generate import simulate_chunk, store_info
 from sainet.engines.base import AbstractEngine
 from sainet.engines.bullet.engine import BulletEngine
 from sainet.engines.devices import over_devices

@@ -6,7 +6,7 @@ import jax
 
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.simulate import simulate_chunk, store_info
+from sainet.datasets.generate import simulate_chunk, store_info
 from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import PAPER, Recipe
 from sainet.learning.step import FitState, even_batch, first_state

@@ -1,16 +1,25 @@
-"""Batches of stored pushes, in the types of engines and models."""
+"""Batches of stored pushes in the types of models, and their simulator predictions."""
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from sainet.datasets.schema import StoreInfo, simulated_name
+from sainet.datasets.schema import (
+    Arrays,
+    StoreInfo,
+    input_names,
+    simulated_name,
+    variables,
+)
+from sainet.engines.base import roll_out
+from sainet.engines.simulator import InternalEngine, SimulatorSpec
 from sainet.runs.errors import Diverged
-from sainet.scenes.controls import CONTROLS, Controls
+from sainet.scenes.controls import CONTROLS, Controls, Pusher
+from sainet.scenes.quantities import PROPERTIES
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
@@ -39,7 +48,7 @@ class PushBatch(eqx.Module):
 
 
 def to_batch(
-    arrays: dict[str, np.ndarray],
+    arrays: Arrays,
     info: StoreInfo,
     *,
     steps: int | None = None,
@@ -53,45 +62,41 @@ def to_batch(
         steps: number of steps to keep; None for all.
         simulated: internal engine whose prediction to include.
     """
-    time = slice(steps)
-    truth = arrays["truth"][:, time]
-    exists = np.arange(truth.shape[1])[None] < arrays["steps"][:, None]
+    known = variables(info)
+    names = [*input_names(info), *([simulated_name(simulated)] if simulated else [])]
+    cut = {}
+    for name in names:
+        has_time = name not in known or "time" in known[name].dimensions
+        cut[name] = arrays[name][:, :steps] if has_time else arrays[name]
+    exists = np.arange(cut["truth"].shape[1])[None] < arrays["steps"][:, None]
     return PushBatch(
         scene=to_scene(arrays, info),
         initial=to_initial(arrays),
-        controls=to_controls(arrays, info, time),
-        truth=jnp.asarray(truth),
-        measured=jnp.asarray(arrays.get("measured", arrays["truth"])[:, time, :, :3]),
-        pose_observed=jnp.asarray((arrays["pose_observed"][:, time] > 0) & exists),
-        rate_observed=jnp.asarray((arrays["rate_observed"][:, time] > 0) & exists),
-        simulated=None
-        if simulated is None
-        else jnp.asarray(arrays[simulated_name(simulated)][:, time]),
+        controls=to_controls(cut, info),
+        truth=jnp.asarray(cut["truth"]),
+        measured=jnp.asarray(cut.get("measured", cut["truth"])[..., :3]),
+        pose_observed=jnp.asarray((cut["pose_observed"] > 0) & exists),
+        rate_observed=jnp.asarray((cut["rate_observed"] > 0) & exists),
+        simulated=jnp.asarray(cut[names[-1]]) if simulated else None,
     )
 
 
-def to_scene(arrays: dict[str, np.ndarray], info: StoreInfo) -> Scene:
+def to_scene(arrays: Arrays, info: StoreInfo) -> Scene:
     """Return the scenes of stored pushes, without varying table friction."""
-    names = ("mass", "radius", "table_friction", "disk_friction", "pusher_friction")
-    known: dict[str, Any] = {
-        name: jnp.asarray(arrays[name]) for name in (*names, "pusher_radius")
-    }
-    return Scene(**known, time_step=info.time_step)
+    known = {name: jnp.asarray(arrays[name]) for name in PROPERTIES}
+    return Scene(**known, friction_field=None, time_step=info.time_step)
 
 
-def to_initial(arrays: dict[str, np.ndarray]) -> State:
+def to_initial(arrays: Arrays) -> State:
     """Return the initial states of stored pushes, with the pusher at rest."""
     pusher = jnp.asarray(arrays["initial_pusher"])
     return unpack_motion(jnp.asarray(arrays["initial"]), pusher, jnp.zeros_like(pusher))
 
 
-def to_controls(
-    arrays: dict[str, np.ndarray], info: StoreInfo, time: slice = slice(None)
-) -> Controls:
+def to_controls(arrays: Arrays, info: StoreInfo) -> Controls:
     """Return the controls of stored pushes."""
-    return CONTROLS[info.kind].from_arrays(
-        arrays, time, pusher_mass=info.pusher_mass, damping=info.damping
-    )
+    pusher = Pusher(info.pusher_mass, info.damping)
+    return CONTROLS[info.kind].from_arrays(arrays, pusher)
 
 
 def from_trajectory(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -100,17 +105,100 @@ def from_trajectory(trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     return motion, np.asarray(trajectory.states.pusher_position)
 
 
+@dataclass(frozen=True)
+class Prediction:
+    """The simulator prediction (s-bar) of one internal engine for stored pushes.
+
+    It is read if the store contains the prediction of an equal specification (engine
+    version included) for the same path of the pusher; otherwise it is computed.
+    """
+
+    internal: InternalEngine
+    info: StoreInfo  # of the pushes
+
+    @property
+    def _name(self) -> str:
+        return simulated_name(self.internal.simulator.stored_as)
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether the store contains the prediction."""
+        # A camera offset displaces the pusher.
+        return not self.internal.camera and self._name in variables(self.info)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The arrays of the store that a batch with the prediction reads."""
+        stored = (self._name,) if self.is_stored else ()
+        return (*input_names(self.info), *stored)
+
+    def complete(self, arrays: Arrays) -> Arrays:
+        """Return arrays with the prediction, computed if they lack it."""
+        if self._name in arrays:
+            return arrays
+        return arrays | {self._name: _roll_out(self.internal, arrays, self.info)}
+
+    def batch(self, arrays: Arrays, steps: int | None = None) -> PushBatch:
+        """Return a batch with the prediction, its pusher in camera coordinates.
+
+        Args:
+            arrays: of some pushes, by variable name.
+            steps: number of steps to keep; None for all.
+        """
+        slug = self.internal.simulator.stored_as
+        arrays = self.complete(arrays)
+        batch = to_batch(arrays, self.info, steps=steps, simulated=slug)
+        moved = _as_measured(self.internal, batch.initial, batch.controls)
+        return replace(batch, initial=moved[0], controls=moved[1])
+
+
+def simulate(
+    simulator: SimulatorSpec, arrays: Arrays, info: StoreInfo, pushes: Sequence[str]
+) -> Float[np.ndarray, "push time body 6"]:
+    """Return the packed motion that a simulator predicts (s-bar).
+
+    Args:
+        simulator: predicts.
+        arrays: scenes, starts and controls of some pushes, by variable name.
+        info: of their store.
+        pushes: names of the pushes in messages.
+
+    Raises:
+        Diverged: the engine produced NaN or infinity.
+        MissingExtra: it needs a package that is not installed.
+    """
+    motion = _roll_out(InternalEngine(simulator), arrays, info)
+    check_finite(simulator.slug, motion, pushes)
+    return motion
+
+
+def _roll_out(
+    internal: InternalEngine, arrays: Arrays, info: StoreInfo
+) -> Float[np.ndarray, "push time body 6"]:
+    moved = _as_measured(internal, to_initial(arrays), to_controls(arrays, info))
+    engine, scene = internal.simulator.build(), to_scene(arrays, info)
+    return from_trajectory(roll_out(engine, scene, *moved))[0]
+
+
+def _as_measured(
+    internal: InternalEngine, initial: State, controls: Controls
+) -> tuple[State, Controls]:
+    """Return states and controls with the pusher where the camera would measure it."""
+    if not internal.camera:
+        return initial, controls
+    offset = jnp.array(internal.camera.vector)
+    return initial.with_pusher_moved(offset), controls.moved(offset)
+
+
 def check_finite(
-    engine: str,
-    motion: Float[np.ndarray, "push time body 6"],
-    names: Sequence[str],
+    engine: str, motion: Float[np.ndarray, "push time body 6"], pushes: Sequence[str]
 ) -> None:
     """Raise `Diverged` if an engine produced NaN or infinity.
 
     Args:
         engine: its name.
         motion: packed, of each push.
-        names: name of each push for the message.
+        pushes: name of each push for the message.
 
     Raises:
         Diverged: the message names the first such push.
@@ -118,6 +206,6 @@ def check_finite(
     finite = np.isfinite(motion).all((1, 2, 3))
     if not finite.all():
         raise Diverged(
-            f"{names[int(np.argmin(finite))]}: engine {engine} gave NaN or infinity; "
+            f"{pushes[int(np.argmin(finite))]}: engine {engine} gave NaN or infinity; "
             "check its masses, radii, frictions and path."
         )

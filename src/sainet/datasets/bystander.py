@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from msgspec import structs
 
-from sainet.datasets.derive import derive
-from sainet.datasets.predictions import simulate
+from sainet.datasets.batch import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name, variables
 from sainet.datasets.store import Store
+from sainet.datasets.writer import derive
 from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import BadStore
 
@@ -125,10 +125,9 @@ def _simulate(
     parts, simulator = [], simulator_named(engine)
     for index in range(info.chunks):
         rows = info.chunk_slice(index)
-        names = [f"push {row} of the dataset" for row in range(rows.start, rows.stop)]
         chunk = {name: array[rows] for name, array in arrays.items()}
-        parts.append(simulate(simulator, chunk, info, names))
-        on_pushes(len(names))
+        parts.append(simulate(simulator, chunk, info, info.push_names(rows)))
+        on_pushes(info.chunk_length(index))
     return np.concatenate(parts)
 
 

@@ -3,23 +3,24 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import msgspec
 import numpy as np
 
 from sainet.datasets.schema import (
+    ARRAYS,
     FORMAT_VERSION,
+    HASHES,
     Arrays,
+    Hashes,
     StoreInfo,
     Variable,
-    chunk_shape,
+    chunk_file,
     published_name,
-    sizes,
     variables,
 )
-from sainet.datasets.writer import ARRAYS, HASHES, Hashes, chunk_file
-from sainet.runs.documents import content_hash, read_document, read_file
+from sainet.runs.documents import content_hash, read_document, read_file, read_json
 from sainet.runs.errors import BadStore, shown
 from sainet.runs.folders import remake
 from sainet.scenes.quantities import Quantity
@@ -29,68 +30,17 @@ _LARGEST_METADATA = 1 << 20  # bytes
 _LARGEST_CHUNK = 4 << 30  # bytes, decompressed
 _OVERHEAD = 1 << 16  # bytes by which compression may enlarge a chunk
 _ENDS = ("low", "high")  # of a range
+# Fields that Zarr may leave out where they have the wanted value.
+_OPTIONAL = {"configuration", "separator", "endian", "checksum", "storage_transformers"}
 _ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a frame
 
 
-class _Metadata(msgspec.Struct, forbid_unknown_fields=True):
-    """A part of the metadata; Zarr refuses fields that it does not define."""
+class _Group(msgspec.Struct, forbid_unknown_fields=True):
+    """The metadata of the group of all arrays."""
 
-
-class _Group(_Metadata):
     attributes: StoreInfo
     zarr_format: Literal[3]
     node_type: Literal["group"]
-
-
-class _ChunkShape(_Metadata):
-    chunk_shape: tuple[int, ...]
-
-
-class _ChunkGrid(_Metadata):
-    name: Literal["regular"]
-    configuration: _ChunkShape
-
-
-class _Separator(_Metadata):
-    separator: Literal["/"] = "/"
-
-
-class _ChunkKeys(_Metadata):
-    name: Literal["default"]
-    configuration: _Separator = msgspec.field(default_factory=_Separator)
-
-
-class _BytesSettings(_Metadata):
-    endian: Literal["little"] = "little"
-
-
-class _Bytes(_Metadata, tag="bytes", tag_field="name"):
-    configuration: _BytesSettings = msgspec.field(default_factory=_BytesSettings)
-
-
-class _ZstdSettings(_Metadata):
-    level: int
-    checksum: bool = False
-
-
-class _Zstd(_Metadata, tag="zstd", tag_field="name"):
-    configuration: _ZstdSettings
-
-
-class _Array(_Metadata):
-    """The metadata of an array, restricted to arrays that the writer makes."""
-
-    shape: tuple[int, ...]
-    data_type: Literal["float32", "int32", "uint8"]
-    chunk_grid: _ChunkGrid
-    chunk_key_encoding: _ChunkKeys
-    fill_value: float | Literal["NaN"]
-    codecs: Annotated[list[_Bytes | _Zstd], msgspec.Meta(min_length=2, max_length=2)]
-    attributes: dict[str, str]
-    zarr_format: Literal[3]
-    node_type: Literal["array"]
-    dimension_names: tuple[str, ...]
-    storage_transformers: tuple[()] = ()
 
 
 def read_info(folder: Path) -> StoreInfo:
@@ -143,7 +93,7 @@ def _damaged(folder: Path, name: str, reason: str) -> BadStore:
 
 
 def _chunk_bytes(folder: Path, name: str, info: StoreInfo, variable: Variable) -> int:
-    size = math.prod(chunk_shape(info, variable)) * np.dtype(variable.dtype).itemsize
+    size = math.prod(variable.chunk_shape(info)) * np.dtype(variable.dtype).itemsize
     if size > _LARGEST_CHUNK:
         reason = f"its chunks have {size} bytes, more than {_LARGEST_CHUNK}"
         raise _damaged(folder, f"{ARRAYS}/{name}", reason)
@@ -182,24 +132,56 @@ def _decompressed_bytes(data: bytes) -> int | None:
 
 
 def _check_array(folder: Path, name: str, info: StoreInfo, variable: Variable) -> None:
-    """Check that an array is stored exactly as the writer stores it."""
-    path = folder / ARRAYS / name / _METADATA
-    found = read_document(path, _Array, error=BadStore, remedy=remake(folder))
-    shape = tuple(sizes(info)[d] for d in variable.dimensions)
-    expected = {
-        "shape": (found.shape, shape),
-        "data_type": (found.data_type, np.dtype(variable.dtype).name),
-        "chunk_shape": (
-            found.chunk_grid.configuration.chunk_shape,
-            chunk_shape(info, variable),
+    """Check that the metadata of an array are those that the writer writes."""
+    found = read_json(folder / ARRAYS / name / _METADATA, BadStore)
+    reason = _difference(found, _array_metadata(info, variable))
+    if reason:
+        raise _damaged(folder, f"{ARRAYS}/{name}", reason)
+
+
+def _array_metadata(info: StoreInfo, variable: Variable) -> dict[str, object]:
+    """Return the metadata of an array: tuples for lists, types for any such value."""
+    chunks = {"chunk_shape": variable.chunk_shape(info)}
+    zstd = {"level": int, "checksum": False}
+    return {
+        "shape": variable.shape(info),
+        "data_type": np.dtype(variable.dtype).name,
+        "chunk_grid": {"name": "regular", "configuration": chunks},
+        "chunk_key_encoding": {
+            "name": "default",
+            "configuration": {"separator": "/"},
+        },
+        "fill_value": "NaN" if variable.dtype is np.float32 else 0,
+        "codecs": (
+            {"name": "bytes", "configuration": {"endian": "little"}},
+            {"name": "zstd", "configuration": zstd},
         ),
-        "dimension_names": (found.dimension_names, variable.dimensions),
-        "codecs": ([type(codec) for codec in found.codecs], [_Bytes, _Zstd]),
+        "attributes": {"units": variable.units, "long_name": str},
+        "zarr_format": 3,
+        "node_type": "array",
+        "dimension_names": variable.dimensions,
+        "storage_transformers": (),
     }
-    for field, (is_value, wanted) in expected.items():
-        if is_value != wanted:
-            reason = f"{field} is {shown(is_value)}, not {wanted}"
-            raise _damaged(folder, f"{ARRAYS}/{name}", reason)
+
+
+def _difference(found: object, wanted: object, field: str = "") -> str:
+    """Return how a part of a JSON document differs from the wanted part, if it does."""
+    if isinstance(wanted, dict) and isinstance(found, dict):
+        if unknown := sorted(found.keys() - wanted.keys()):
+            return f"{field}{shown(unknown[0])} is unknown"
+        if missing := sorted(wanted.keys() - found.keys() - _OPTIONAL):
+            return f"{field}{missing[0]} is missing"
+        parts = ((found[name], wanted[name], f"{field}{name}.") for name in found)
+    elif isinstance(wanted, tuple) and isinstance(found, list):
+        if len(found) != len(wanted):
+            return f"{field}length is {len(found)}, not {len(wanted)}"
+        places = range(len(found))
+        parts = ((found[i], wanted[i], f"{field}{i}.") for i in places)
+    elif found == wanted if type(found) is type(wanted) else type(found) is wanted:
+        return ""
+    else:
+        return f"{field.rstrip('.')} is {shown(found)}, not {wanted}"
+    return next(filter(None, (_difference(*part) for part in parts)), "")
 
 
 def check_values(

@@ -1,32 +1,31 @@
 """Simulated datasets, made chunk by chunk by any number of workers."""
 
-import logging
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+
+from sainet.datasets.batch import check_finite, from_trajectory
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.schema import StoreInfo
-from sainet.datasets.simulate import simulate_chunk, store_info
-from sainet.datasets.store import Store, open_store
-from sainet.datasets.writer import (
-    HASHES,
-    clear_progress,
-    create_arrays,
-    finish,
-    missing_chunks,
-    write_chunk,
-)
+from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
+from sainet.datasets.store import Store
+from sainet.datasets.writer import write_once
 from sainet.engines import make_engine
-from sainet.engines.bullet.engine import MOST_DISKS, BulletEngine
+from sainet.engines.base import roll_out
 from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import require
-from sainet.runs.folders import open_run
-from sainet.runs.workers import each_done
+from sainet.scenes.controls import Controls
+from sainet.scenes.quantities import PROPERTIES
+from sainet.scenes.scene import TIME_STEP, Scene
+from sainet.scenes.state import State, pack_motion
+from sainet.worlds.config import bounds
+from sainet.worlds.noise import at_level
 from sainet.worlds.sampling import chunk_generator, draw
-
-_log = logging.getLogger(__name__)
+from sainet.worlds.setups import SETUPS
+from sainet.worlds.world import SimulatedWorld
 
 
 def generate(
@@ -55,41 +54,95 @@ def generate(
         Diverged: an engine produced NaN or infinity.
     """
     _check_possible(config)
-    folder = open_run(
-        out, {"command": "generate", **asdict(config)}, finished_by=HASHES
+    return write_once(
+        out,
+        {"command": "generate", **asdict(config)},
+        store_info(config),
+        partial(simulate_chunk, config),
+        executor=executor,
+        on_pushes=on_pushes,
     )
-    if folder.is_finished:
-        _log.info("%s is finished already", out)
-        clear_progress(out)
-        return open_store(out)
-    info = store_info(config)
-    create_arrays(out, info)
-    missing = missing_chunks(out, info)
-    on_pushes(config.pushes - sum(_length(info, i) for i in missing))
-    jobs = [(config, out, index) for index in missing]
-    for index in each_done(executor, make_chunk, jobs):
-        on_pushes(_length(info, index))
-    finish(out, info)
-    return open_store(out)
 
 
 def _check_possible(config: GenerateConfig) -> None:
     """Raise before anything is written: an engine may be missing, or room for disks."""
     engines = [make_engine(config.engine)]
-    engines += [simulator_named(name).build().engine for name in config.assumed_engine]
-    if any(isinstance(engine, BulletEngine) for engine in engines):
-        wanted = f"at most {MOST_DISKS} with the engine bullet"
-        require(config.disks <= MOST_DISKS, "disks", wanted, config.disks)
+    engines += [simulator_named(name).build() for name in config.assumed_engine]
+    most = min(engine.most_disks for engine in engines)
+    wanted = f"at most {most} with these engines"
+    require(config.disks <= most, "disks", wanted, config.disks)
     for index in range(store_info(config).chunks):
         draw(config, chunk_generator(config.seed, index), config.chunk_size)
 
 
-def make_chunk(config: GenerateConfig, out: Path, index: int) -> int:
-    """Simulate and write one chunk (the job of a worker) and return its index."""
-    write_chunk(out, store_info(config), index, simulate_chunk(config, index))
-    return index
+def store_info(config: GenerateConfig) -> StoreInfo:
+    """Return the properties of the whole dataset."""
+    stroke = np.array(bounds(config.stroke_mm)[1] / 1000)
+    speed = np.array(bounds(config.speed_mm_s)[0] / 1000)
+    longest = SETUPS[config.setup](config).steps(stroke, speed)
+    specs = [simulator_named(name) for name in config.assumed_engine]
+    return StoreInfo(
+        kind=config.setup,
+        pushes=config.pushes,
+        bodies=config.disks,
+        steps=int(longest),
+        chunk_size=config.chunk_size,
+        time_step=TIME_STEP,
+        engine=config.engine,
+        assumed_engines=tuple(spec.stored_as for spec in specs),
+        has_measurements=True,
+        seed=config.seed,
+    )
 
 
-def _length(info: StoreInfo, index: int) -> int:
+def simulate_chunk(config: GenerateConfig, index: int) -> Arrays:
+    """Return every array of one chunk of the dataset.
+
+    The chunk depends only on the settings and its index, not on the process.
+
+    Raises:
+        Diverged: an engine predicted NaN or infinity.
+    """
+    info = store_info(config)
     part = info.chunk_slice(index)
-    return part.stop - part.start
+    world = SimulatedWorld(
+        make_engine(config.engine),
+        SETUPS[config.setup](config),
+        at_level(config.noise, config.noise_level),
+        chunk_generator(config.seed, index),
+    )
+    # Always a whole chunk, so that the last chunk needs no compilation of its own.
+    draws = draw(config, world.rng, config.chunk_size)
+    scene, push = draws.scene(), draws.push()
+    initial, controls = world.setup.command(scene, draws.state(), push, info.steps)
+    rough = world.roughen(scene)
+    truth, pusher = from_trajectory(world.execute(rough, initial, controls))
+    predicted = {"truth": truth}
+    engines = {"truth": config.engine}
+    for name in config.assumed_engine:
+        simulator = simulator_named(name)
+        array = simulated_name(simulator.stored_as)
+        motion = roll_out(simulator.build(), scene, initial, controls)
+        predicted[array], engines[array] = from_trajectory(motion)[0], name
+    arrays = {
+        **_scene_arrays(scene, initial, controls),
+        **predicted,
+        "steps": world.setup.steps(draws.stroke, draws.speed),
+        "group": np.zeros(config.chunk_size),
+        "truth_pusher": pusher,
+        "pose_observed": np.ones(truth.shape[:2]),
+        "rate_observed": np.ones(truth.shape[:2]),
+        "measured": world.capture(truth[..., :3]),
+    }
+    arrays = {name: value[: part.stop - part.start] for name, value in arrays.items()}
+    pushes = info.push_names(part)
+    for array, engine in engines.items():
+        check_finite(engine, arrays[array], pushes)
+    return arrays
+
+
+def _scene_arrays(scene: Scene, initial: State, controls: Controls) -> Arrays:
+    arrays = {name: getattr(scene, name) for name in PROPERTIES}
+    arrays |= {"initial": pack_motion(initial), **controls.arrays()}
+    arrays |= {"initial_pusher": initial.pusher_position}
+    return {name: np.asarray(value) for name, value in arrays.items()}

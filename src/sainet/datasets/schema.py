@@ -1,4 +1,4 @@
-"""The arrays of a dataset: dimensions, units, meaning and range of each."""
+"""The arrays and files of a dataset: dimensions, units, meaning and range of each."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -10,15 +10,12 @@ from sainet.scenes.quantities import (
     ANGLE,
     DAMPING,
     FORCE,
-    FRICTION,
-    MASS,
     MOST_DISKS,
     MOST_PUSHES,
     MOST_STEPS,
     POSITION,
+    PROPERTIES,
     PUSHER_MASS,
-    PUSHER_RADIUS,
-    RADIUS,
     SPIN,
     VELOCITY,
     Quantity,
@@ -30,7 +27,9 @@ Arrays = dict[str, np.ndarray]  # of some pushes, by the names of variables
 
 FORMAT_VERSION = 2
 RECORDED = "recorded"  # instead of the engine that made the ground truth
-MOTION_UNITS = "m m rad m/s m/s rad/s"
+ARRAYS = "pushes.zarr"  # folder of the arrays
+HASHES = "hashes.json"
+Hashes = dict[str, str]  # SHA-256 by file, relative to the folder of the arrays
 
 # Part of a file name: of an engine or a model.
 _Name = Annotated[
@@ -41,6 +40,13 @@ _Group = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 
 def _count(high: int) -> msgspec.Meta:
     return msgspec.Meta(ge=1, le=high)
+
+
+class Listing(msgspec.Struct, frozen=True, kw_only=True):
+    """Hashes of the files of a dataset; written last, so it marks a whole dataset."""
+
+    files: Hashes
+    format_version: int = FORMAT_VERSION
 
 
 class StoreInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -78,17 +84,42 @@ class StoreInfo(msgspec.Struct, frozen=True, kw_only=True):
         start = index * self.chunk_size
         return slice(start, min(start + self.chunk_size, self.pushes))
 
+    def chunk_length(self, index: int) -> int:
+        """Return the number of pushes of one chunk."""
+        part = self.chunk_slice(index)
+        return part.stop - part.start
+
+    def push_names(self, part: slice) -> list[str]:
+        """Return the names of some pushes in messages."""
+        return [f"push {row} of the dataset" for row in range(part.start, part.stop)]
+
 
 @dataclass(frozen=True)
 class Variable:
     """One stored array; its first dimension is always `push`."""
 
     dimensions: tuple[str, ...]
-    units: str
     meaning: str
     # Of the values; of each column of the last dimension, if there are several.
     quantities: tuple[Quantity, ...] = ()
     dtype: type = np.float32
+    is_input: bool = True  # of `batch.to_batch`, whatever the model
+    is_hashed: bool = False  # part of what makes a push the same in every dataset
+
+    @property
+    def units(self) -> str:
+        """The unit of the values, or of each column."""
+        return " ".join(each.unit or "1" for each in self.quantities) or "1"
+
+    def shape(self, info: StoreInfo) -> tuple[int, ...]:
+        """Return the shape of the whole array."""
+        lengths = {"push": info.pushes, "time": info.steps, "body": info.bodies}
+        lengths |= {"motion": 6, "pose": 3, "xy": 2}
+        return tuple(lengths[dimension] for dimension in self.dimensions)
+
+    def chunk_shape(self, info: StoreInfo) -> tuple[int, ...]:
+        """Return the shape of the chunks of the array."""
+        return (min(info.chunk_size, info.pushes), *self.shape(info)[1:])
 
 
 _POSE_QUANTITIES = (POSITION, POSITION, ANGLE)
@@ -97,103 +128,108 @@ _PUSH = ("push",)
 _BODY = ("push", "body")
 _MOTION = ("push", "time", "body", "motion")
 _PATH = ("push", "time", "xy")
+_XY = ("push", "xy")
+_MEANINGS = {
+    "mass": "mass of a disk",
+    "radius": "radius of a disk",
+    "table_friction": "friction between disks and table",
+    "disk_friction": "friction between two disks",
+    "pusher_friction": "friction of pusher and disk",
+    "pusher_radius": "radius of the pusher",
+}
 
 _ALWAYS = {
-    "mass": Variable(_BODY, "kg", "mass of a disk", (MASS,)),
-    "radius": Variable(_BODY, "m", "radius of a disk", (RADIUS,)),
-    "table_friction": Variable(
-        _PUSH, "1", "friction between disks and table", (FRICTION,)
+    name: Variable(
+        _BODY if name in ("mass", "radius") else _PUSH, _MEANINGS[name], (quantity,)
+    )
+    for name, quantity in PROPERTIES.items()
+} | {
+    "steps": Variable(
+        _PUSH, "number of steps of the push", dtype=np.int32, is_hashed=True
     ),
-    "disk_friction": Variable(_PUSH, "1", "friction between two disks", (FRICTION,)),
-    "pusher_friction": Variable(_PUSH, "1", "friction of pusher and disk", (FRICTION,)),
-    "pusher_radius": Variable(_PUSH, "m", "radius of the pusher", (PUSHER_RADIUS,)),
-    "steps": Variable(_PUSH, "1", "number of steps of the push", dtype=np.int32),
-    "group": Variable(_PUSH, "1", "index into the attribute groups", dtype=np.int32),
+    "group": Variable(
+        _PUSH, "index into the attribute groups", dtype=np.int32, is_input=False
+    ),
     "initial": Variable(
         ("push", "body", "motion"),
-        MOTION_UNITS,
         "state before the push",
         _MOTION_QUANTITIES,
+        is_hashed=True,
     ),
     "initial_pusher": Variable(
-        ("push", "xy"), "m", "pusher before the push", (POSITION,)
+        _XY, "pusher before the push", (POSITION,), is_hashed=True
     ),
-    "truth": Variable(
-        _MOTION,
-        MOTION_UNITS,
-        "true state after each step",
-        _MOTION_QUANTITIES,
+    "truth": Variable(_MOTION, "true state after each step", _MOTION_QUANTITIES),
+    "truth_pusher": Variable(
+        _PATH, "true pusher after each step", (POSITION,), is_input=False
     ),
-    "truth_pusher": Variable(_PATH, "m", "true pusher after each step", (POSITION,)),
     "pose_observed": Variable(
-        ("push", "time"), "1", "1 where the pose is known", dtype=np.uint8
+        ("push", "time"), "1 where the pose is known", dtype=np.uint8
     ),
     "rate_observed": Variable(
-        ("push", "time"), "1", "1 where the velocities are known", dtype=np.uint8
+        ("push", "time"), "1 where the velocities are known", dtype=np.uint8
     ),
 }
 
+# Arrays of the controls, by the names that `scenes.controls` gives them.
 _COMMANDS: dict[SetupName, dict[str, Variable]] = {
     "robot": {
         "command_position": Variable(
-            _PATH, "m", "commanded pusher after each step", (POSITION,)
+            _PATH, "commanded pusher after each step", (POSITION,), is_hashed=True
         ),
         "command_velocity": Variable(
-            _PATH, "m/s", "commanded velocity during each step", (VELOCITY,)
+            _PATH, "commanded velocity during each step", (VELOCITY,)
         ),
     },
     "direct-force": {
         "force": Variable(
             _PATH,
-            "N",
             "commanded force on the pusher during each step",
             (FORCE,),
+            is_hashed=True,
         ),
         "contact_offset": Variable(
-            ("push", "xy"), "m", "pusher minus disk 1 at the start", (POSITION,)
+            _XY, "pusher minus disk 1 at the start", (POSITION,), is_hashed=True
         ),
     },
 }
-
-
-def chunk_shape(info: StoreInfo, variable: Variable) -> tuple[int, ...]:
-    """Return the shape of the chunks of an array."""
-    lengths = tuple(sizes(info)[d] for d in variable.dimensions)
-    return (min(info.chunk_size, info.pushes), *lengths[1:])
 
 
 def variables(info: StoreInfo) -> dict[str, Variable]:
     """Return every array of such a store by its name."""
     found = _ALWAYS | _COMMANDS[info.kind]
     if info.has_measurements:
+        dimensions = ("push", "time", "body", "pose")
         found["measured"] = Variable(
-            ("push", "time", "body", "pose"),
-            "m m rad",
-            "pose as it was captured",
-            _POSE_QUANTITIES,
+            dimensions, "pose as it was captured", _POSE_QUANTITIES
         )
     if info.has_repeats:
         found["repeat"] = Variable(
-            ("push",),
-            "1",
+            _PUSH,
             "pushes that were meant to be alike share it",
             dtype=np.int32,
+            is_input=False,
         )
     for engine in info.assumed_engines:
         found[simulated_name(engine)] = Variable(
             _MOTION,
-            MOTION_UNITS,
             f"s-bar: prediction of {engine}, assumed properties",
             _MOTION_QUANTITIES,
+            is_input=False,
         )
     for model in info.published:
         found[published_name(model)] = Variable(
             ("push", "body", "pose"),
-            "m m rad",
             f"final pose as published: {model}",
             _POSE_QUANTITIES,
+            is_input=False,
         )
     return found
+
+
+def input_names(info: StoreInfo) -> tuple[str, ...]:
+    """Return the arrays of every batch; simulator predictions come on request."""
+    return tuple(name for name, each in variables(info).items() if each.is_input)
 
 
 def simulated_name(engine: str) -> str:
@@ -206,13 +242,6 @@ def published_name(model: str) -> str:
     return "published_" + model
 
 
-def sizes(info: StoreInfo) -> dict[str, int]:
-    """Return the length of every dimension."""
-    return {
-        "push": info.pushes,
-        "time": info.steps,
-        "body": info.bodies,
-        "motion": 6,
-        "pose": 3,
-        "xy": 2,
-    }
+def chunk_file(name: str, variable: Variable, index: int) -> str:
+    """Return the file of one chunk of an array, in the folder of the arrays."""
+    return "/".join([name, "c", str(index), *["0"] * (len(variable.dimensions) - 1)])

@@ -1,6 +1,7 @@
 """Stores of pushes: checked when they are opened, then read in parts."""
 
-from collections.abc import Iterable
+import hashlib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,15 +12,25 @@ from jaxtyping import Int, UInt64
 from msgspec import structs
 
 from sainet.datasets.check import check_files, check_values, read_info
-from sainet.datasets.pushes import hash_pushes, hashed_names
-from sainet.datasets.schema import StoreInfo, variables
-from sainet.datasets.writer import ARRAYS, HASHES, Listing
+from sainet.datasets.schema import (
+    ARRAYS,
+    HASHES,
+    Arrays,
+    Listing,
+    StoreInfo,
+    Variable,
+    variables,
+)
+from sainet.runs.digests import BYTES
 from sainet.runs.documents import content_hash, read_document, read_file, readable
 from sainet.runs.errors import BadInput, BadStore, hint, shown
 from sainet.runs.folders import remake
 
 if TYPE_CHECKING:
     import xarray
+
+    from sainet.datasets.batch import Prediction
+    from sainet.engines.simulator import InternalEngine
 
 
 @dataclass(frozen=True)
@@ -139,13 +150,22 @@ class Store:
         return whole if self.rows is None else whole.isel(push=list(self.rows))
 
     def push_hashes(self) -> UInt64[np.ndarray, " push"]:
-        """Return the content hash of each push (see `datasets.pushes.hash_pushes`)."""
-        names = hashed_names(self.info)
-        parts = [
-            hash_pushes(self.read(self.info.chunk_slice(index), names), self.info)
-            for index in range(self.info.chunks)
-        ]
-        return np.concatenate(parts)
+        """Return a hash of where each push started and of its command.
+
+        A push has the same hash in every store: it does not depend on assumptions of an
+        import (masses, frictions), simulator predictions or the other pushes.
+        """
+        info = self.info
+        known = {n: each for n, each in variables(info).items() if each.is_hashed}
+        parts = [info.chunk_slice(index) for index in range(info.chunks)]
+        read = (self.read(part, tuple(known)) for part in parts)
+        return np.concatenate([_hash_pushes(arrays, known) for arrays in read])
+
+    def prediction(self, internal: "InternalEngine") -> "Prediction":
+        """Return the simulator prediction of an internal engine for these pushes."""
+        from sainet.datasets.batch import Prediction
+
+        return Prediction(internal, self.info)
 
     @property
     def content(self) -> str:
@@ -155,6 +175,21 @@ class Store:
             return whole
         chosen = len(self.rows) if self._is_prefix else self.rows
         return content_hash(f"{whole} {chosen}".encode())
+
+
+def _hash_pushes(
+    arrays: Arrays, known: Mapping[str, Variable]
+) -> UInt64[np.ndarray, " push"]:
+    hashes = np.empty(len(arrays["steps"]), np.uint64)
+    for row, count in enumerate(arrays["steps"]):
+        digest = hashlib.sha256(int(count).to_bytes(8, "little"))
+        for name in filter(lambda name: name != "steps", known):
+            # Beyond its end a push is filled up to the longest push of the store.
+            stop = count if "time" in known[name].dimensions else None
+            value = arrays[name][row][:stop]
+            digest.update(np.ascontiguousarray(value, "<f4").tobytes())
+        hashes[row] = int.from_bytes(digest.digest()[:BYTES], "big")
+    return hashes
 
 
 def open_store(path: Path | str, *, verify: bool = True) -> Store:

@@ -21,13 +21,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import j0
 
+from sainet.datasets.batch import simulate
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.derive import derive
-from sainet.datasets.predictions import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
+from sainet.datasets.writer import derive
 from sainet.engines.simulator import simulator_named
-from sainet.worlds.noise_config import NoiseConfig
+from sainet.worlds.noise import NoiseConfig
 
 # Simulated pushes like the recorded ones, which last up to 5 s: 50 mm of one disk. The
 # disk has the properties of the recorded disk, which are also the assumed properties:

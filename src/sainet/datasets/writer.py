@@ -1,22 +1,25 @@
 """Writing of stores, chunk by chunk; a list of hashes, written last, completes them."""
 
+import logging
 import shutil
 from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
 
 from sainet.datasets.schema import (
-    FORMAT_VERSION,
+    ARRAYS,
+    HASHES,
     Arrays,
+    Hashes,
+    Listing,
     StoreInfo,
-    Variable,
-    chunk_shape,
-    sizes,
+    chunk_file,
     variables,
 )
+from sainet.datasets.store import Store, open_store
 from sainet.runs.documents import (
     checked,
     content_hash,
@@ -26,26 +29,112 @@ from sainet.runs.documents import (
 )
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
+from sainet.runs.workers import each_done
 
-ARRAYS = "pushes.zarr"
-HASHES = "hashes.json"
 PROGRESS = "progress"
-Hashes = dict[str, str]  # SHA-256 by file, relative to the folder of the arrays
+_log = logging.getLogger(__name__)
+MakeChunk = Callable[[int], Arrays]  # of an index
 
 
-class Listing(msgspec.Struct, frozen=True, kw_only=True):
-    """Hashes of the files of a dataset; written last, so it marks a whole dataset."""
+def write_once(
+    out: Path,
+    settings: Mapping[str, object],
+    info: StoreInfo,
+    make_chunk: MakeChunk,
+    *,
+    executor: Executor | None = None,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+) -> Store:
+    """Return the store in a run folder; write it first, or resume writing.
 
-    files: Hashes
-    format_version: int = FORMAT_VERSION
+    Args:
+        out: run folder.
+        settings: JSON values that determine the store.
+        info: of the store.
+        make_chunk: returns the arrays of one chunk.
+        executor: makes and writes the chunks; None does so in this process.
+        on_pushes: called with the number of newly written pushes.
+
+    Raises:
+        RunConflict: the folder belongs to another run, or another process uses it.
+        BadInput: the disk is full.
+    """
+    folder = open_run(out, settings, finished_by=HASHES)  # locked as long as it exists
+    if folder.is_finished:
+        _log.info("%s is finished already", out)
+        _clear_progress(out)
+    else:
+        _write(out, info, make_chunk, executor, on_pushes)
+    return open_store(out)
 
 
-def create_arrays(folder: Path, info: StoreInfo) -> None:
-    """Create the empty arrays of a store; repeated calls give the same bytes.
+def derive(
+    store: Store,
+    out: Path,
+    settings: Mapping[str, object],
+    change: Callable[[Arrays], Arrays],
+) -> Store:
+    """Return a dataset that a function makes of another dataset; written once.
+
+    Args:
+        store: read whole into memory.
+        out: the run folder.
+        settings: settings of the function, as JSON values: with the content of the
+            store, they identify the derived dataset.
+        change: returns the changed arrays, with fewer pushes or more disks.
+
+    Raises:
+        RunConflict: the folder belongs to another run.
+    """
+    known = {"command": "derive", "data": store.content, **settings}
+    folder = open_run(out, known, finished_by=HASHES)
+    if not folder.is_finished:
+        arrays = change(store.read(slice(None)))
+        pushes, bodies = arrays["mass"].shape
+        info = msgspec.structs.replace(store.info, pushes=pushes, bodies=bodies)
+        write_store(out, info, arrays)
+    return open_store(out)
+
+
+def write_store(folder: Path, info: StoreInfo, arrays: Arrays) -> None:
+    """Write a store whose arrays are in memory.
 
     Raises:
         BadInput: the disk is full, or a property of the dataset is out of range.
     """
+
+    def part(index: int) -> Arrays:
+        return {name: a[info.chunk_slice(index)] for name, a in arrays.items()}
+
+    _write(folder, info, part, None, lambda pushes: None)
+
+
+def _write(
+    folder: Path,
+    info: StoreInfo,
+    make_chunk: MakeChunk,
+    executor: Executor | None,
+    on_pushes: Callable[[int], None],
+) -> None:
+    """Write the missing chunks, then the list of all hashes, which completes it."""
+    _create_arrays(folder, info)
+    missing = missing_chunks(folder, info)
+    on_pushes(info.pushes - sum(map(info.chunk_length, missing)))
+    jobs = [(folder, info, index, make_chunk) for index in missing]
+    for index in each_done(executor, _write_chunk, jobs):
+        on_pushes(info.chunk_length(index))
+    hashes: Hashes = {}
+    for index in range(info.chunks):
+        hashes |= read_document(_receipt(folder, index), Listing).files
+    for path in sorted((folder / ARRAYS).rglob("zarr.json")):
+        name = path.relative_to(folder / ARRAYS).as_posix()
+        hashes[name] = content_hash(path.read_bytes())
+    write_document(folder / HASHES, Listing(files=hashes))
+    _clear_progress(folder)
+
+
+def _create_arrays(folder: Path, info: StoreInfo) -> None:
+    """Create the empty arrays of a store; repeated calls give the same bytes."""
     import zarr
     from zarr.codecs import ZstdCodec
 
@@ -56,11 +145,10 @@ def create_arrays(folder: Path, info: StoreInfo) -> None:
         for name, variable in variables(info).items():
             if name in group:
                 continue
-            shape = tuple(sizes(info)[d] for d in variable.dimensions)
             group.create_array(
                 name,
-                shape=shape,
-                chunks=chunk_shape(info, variable),
+                shape=variable.shape(info),
+                chunks=variable.chunk_shape(info),
                 dtype=variable.dtype,
                 fill_value=np.nan if variable.dtype is np.float32 else 0,
                 compressors=ZstdCodec(level=1),
@@ -72,20 +160,13 @@ def create_arrays(folder: Path, info: StoreInfo) -> None:
         raise write_error(folder / ARRAYS, error) from error
 
 
-def write_chunk(folder: Path, info: StoreInfo, index: int, arrays: dict) -> None:
-    """Write one chunk of every array, then its receipt.
-
-    Args:
-        folder: run folder.
-        info: of the store.
-        index: index of the chunk.
-        arrays: NumPy arrays by variable name, shape ``[pushes of the chunk, ...]``.
-
-    Raises:
-        BadInput: the disk is full.
-    """
+def _write_chunk(
+    folder: Path, info: StoreInfo, index: int, make_chunk: MakeChunk
+) -> int:
+    """Make and write one chunk of every array, then its receipt; return its index."""
     import zarr
 
+    arrays = make_chunk(index)
     try:
         group = zarr.open_group(folder / ARRAYS, mode="r+")
         with zarr.config.set({"array.write_empty_chunks": True}):
@@ -96,19 +177,14 @@ def write_chunk(folder: Path, info: StoreInfo, index: int, arrays: dict) -> None
         raise write_error(folder / ARRAYS, error) from error
     hashes = {
         name: content_hash((folder / ARRAYS / name).read_bytes())
-        for name in chunk_files(info, index)
+        for name in _chunk_files(info, index)
     }
     write_document(_receipt(folder, index), Listing(files=hashes))
+    return index
 
 
-def chunk_files(info: StoreInfo, index: int) -> list[str]:
-    """Return the files of one chunk, relative to the folder of the arrays."""
+def _chunk_files(info: StoreInfo, index: int) -> list[str]:
     return [chunk_file(name, each, index) for name, each in variables(info).items()]
-
-
-def chunk_file(name: str, variable: Variable, index: int) -> str:
-    """Return the file of one chunk of an array."""
-    return "/".join([name, "c", str(index), *["0"] * (len(variable.dimensions) - 1)])
 
 
 def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
@@ -127,68 +203,17 @@ def _is_written(folder: Path, info: StoreInfo, index: int) -> bool:
         receipt = read_document(_receipt(folder, index), Listing).files
     except BadInput:
         return False
+    paths = {name: folder / ARRAYS / name for name in _chunk_files(info, index)}
     return all(
-        name in receipt and _hash_or_none(folder / ARRAYS / name) == receipt[name]
-        for name in chunk_files(info, index)
+        path.is_file() and content_hash(path.read_bytes()) == receipt.get(name)
+        for name, path in paths.items()
     )
-
-
-def _hash_or_none(path: Path) -> str | None:
-    return content_hash(path.read_bytes()) if path.is_file() else None
 
 
 def _receipt(folder: Path, index: int) -> Path:
     return folder / PROGRESS / f"chunk-{index:06d}.json"
 
 
-def finish(folder: Path, info: StoreInfo) -> None:
-    """Write the list of all hashes, which completes the dataset."""
-    hashes: Hashes = {}
-    for index in range(info.chunks):
-        hashes |= read_document(_receipt(folder, index), Listing).files
-    for path in sorted((folder / ARRAYS).rglob("zarr.json")):
-        name = path.relative_to(folder / ARRAYS).as_posix()
-        hashes[name] = content_hash(path.read_bytes())
-    write_document(folder / HASHES, Listing(files=hashes))
-    clear_progress(folder)
-
-
-def clear_progress(folder: Path) -> None:
+def _clear_progress(folder: Path) -> None:
     """Remove the receipts of a finished store, if there are any."""
     shutil.rmtree(folder / PROGRESS, ignore_errors=True)
-
-
-def write_store(folder: Path, info: StoreInfo, arrays: dict) -> None:
-    """Write a store whose arrays are in memory."""
-    create_arrays(folder, info)
-    for index in range(info.chunks):
-        part = {k: v[info.chunk_slice(index)] for k, v in arrays.items()}
-        write_chunk(folder, info, index, part)
-    finish(folder, info)
-
-
-def write_once(
-    out: Path,
-    settings: Mapping[str, Any],
-    info: StoreInfo,
-    make_chunk: Callable[[int], Arrays],
-) -> None:
-    """Write a store into a run folder; resume an interrupted one.
-
-    Args:
-        out: run folder.
-        settings: JSON values that determine the store.
-        info: of the store.
-        make_chunk: returns the arrays of one chunk.
-
-    Raises:
-        RunConflict: the folder belongs to another run, or another process uses it.
-        BadInput: the disk is full.
-    """
-    if open_run(out, settings, finished_by=HASHES).is_finished:
-        clear_progress(out)
-        return
-    create_arrays(out, info)
-    for index in missing_chunks(out, info):
-        write_chunk(out, info, index, make_chunk(index))
-    finish(out, info)

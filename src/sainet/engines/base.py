@@ -8,6 +8,7 @@ from jaxtyping import Array, Float
 
 from sainet.engines.simulator import PAPER, Assumptions
 from sainet.scenes.controls import Controls
+from sainet.scenes.quantities import MOST_DISKS
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 
@@ -27,6 +28,11 @@ class AbstractEngine(eqx.Module):
     def on_host(self) -> bool:
         """Whether it runs outside JAX, so that its rollouts cannot be compiled."""
         return False
+
+    @property
+    def most_disks(self) -> int:
+        """The largest number of disks that a scene may have."""
+        return MOST_DISKS
 
 
 def roll_out(
@@ -73,6 +79,11 @@ class AssumedProperties(AbstractEngine):
     def on_host(self) -> bool:
         """Whether the wrapped engine works outside JAX."""
         return self.engine.on_host
+
+    @property
+    def most_disks(self) -> int:
+        """The largest number of disks of the wrapped engine."""
+        return self.engine.most_disks
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Roll the wrapped engine out in the assumed scene."""

@@ -60,6 +60,11 @@ class _Spec(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
         return f"{self.engine}-{content_hash(msgspec.json.encode(self))[:_DIGEST]}"
 
     @property
+    def stored_as(self) -> str:
+        """The name of its predictions in datasets; later versions have other names."""
+        return self.slug if self.version == 1 else f"{self.slug}.v{self.version}"
+
+    @property
     def is_identified(self) -> bool:
         """Whether parameters were estimated from pushes."""
         return self not in SIMULATORS.values()

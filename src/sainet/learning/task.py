@@ -11,9 +11,7 @@ import jax.numpy as jnp
 import msgspec
 import numpy as np
 
-from sainet.datasets.batch import PushBatch, to_batch
-from sainet.datasets.predictions import add_prediction, as_measured, is_stored
-from sainet.datasets.schema import simulated_name, variables
+from sainet.datasets.batch import Prediction, PushBatch, to_batch
 from sainet.datasets.splits import split_rows
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
@@ -79,12 +77,11 @@ class Task:
     @property
     def names(self) -> tuple[str, ...]:
         """The arrays of the store that training reads."""
-        unread = ("truth_pusher", "group", "repeat", "published")
-        skip = lambda name: name.startswith(("simulated_", *unread))  # noqa: E731
-        kept = [name for name in variables(self.store.info) if not skip(name)]
-        if not is_stored(self.assumed, self.store.info):
-            return tuple(kept)
-        return (*kept, simulated_name(self.assumed.simulator.slug))
+        return self._prediction.names
+
+    @property
+    def _prediction(self) -> Prediction:
+        return self.store.prediction(self.assumed)
 
     @property
     def features(self) -> FeatureSet:
@@ -118,9 +115,7 @@ class Task:
 
     def complete(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return stored arrays with the simulator prediction that the network takes."""
-        if self.inner is None:
-            return arrays
-        return add_prediction(self.inner, arrays, self.store.info)[0]
+        return arrays if self.inner is None else self._prediction.complete(arrays)
 
     def to_batch(self, arrays: dict[str, np.ndarray], steps: int) -> PushBatch:
         """Return the batch of stored arrays, with the inputs of the network."""
@@ -143,11 +138,10 @@ class Task:
         self, arrays: dict[str, np.ndarray], steps: int, inner: InternalEngine | None
     ) -> PushBatch:
         info, steps = self.store.info, min(steps, self.recipe.horizon.steps)
-        simulated = None
-        if inner is not None:
-            arrays, simulated = add_prediction(inner, arrays, info)
-        batch = to_batch(arrays, info, steps=steps, simulated=simulated)
-        batch = batch if inner is None else as_measured(inner, batch)
+        if inner is None:
+            batch = to_batch(arrays, info, steps=steps)
+        else:
+            batch = self._prediction.batch(arrays, steps)
         if not self.has_single_steps:
             return batch
         # IN's statistics are of a simulated path too, but not of its single steps.

@@ -114,20 +114,13 @@ class Controls(eqx.Module):
     @classmethod
     @abstractmethod
     def from_arrays(
-        cls,
-        arrays: Mapping[str, np.ndarray],
-        time: slice,
-        *,
-        pusher_mass: float,
-        damping: float,
+        cls, arrays: Mapping[str, np.ndarray], pusher: Pusher
     ) -> "Controls":
         """Return the controls of stored pushes.
 
         Args:
             arrays: as `arrays` returns them.
-            time: steps to keep.
-            pusher_mass: kg, where a force drives the pusher.
-            damping: N s/m, where a force drives the pusher.
+            pusher: where a force drives it.
         """
 
 
@@ -191,18 +184,11 @@ class PathControls(Controls):
 
     @classmethod
     def from_arrays(
-        cls,
-        arrays: Mapping[str, np.ndarray],
-        time: slice,
-        *,
-        pusher_mass: float,
-        damping: float,
+        cls, arrays: Mapping[str, np.ndarray], pusher: Pusher
     ) -> "PathControls":
-        """Return the paths of stored pushes; mass and damping have no effect."""
-        return cls(
-            position=jnp.asarray(arrays["command_position"][:, time]),
-            velocity=jnp.asarray(arrays["command_velocity"][:, time]),
-        )
+        """Return the paths of stored pushes; the pusher stays on them."""
+        names = ("command_position", "command_velocity")
+        return cls(*(jnp.asarray(arrays[name]) for name in names))
 
 
 class ForceControls(Controls):
@@ -272,20 +258,11 @@ class ForceControls(Controls):
 
     @classmethod
     def from_arrays(
-        cls,
-        arrays: Mapping[str, np.ndarray],
-        time: slice,
-        *,
-        pusher_mass: float,
-        damping: float,
+        cls, arrays: Mapping[str, np.ndarray], pusher: Pusher
     ) -> "ForceControls":
         """Return the forces of stored pushes."""
-        return cls(
-            force=jnp.asarray(arrays["force"][:, time]),
-            contact_offset=jnp.asarray(arrays["contact_offset"]),
-            pusher_mass=pusher_mass,
-            damping=damping,
-        )
+        force, offset = (jnp.asarray(arrays[n]) for n in ("force", "contact_offset"))
+        return cls(force, offset, pusher.mass, pusher.damping)
 
 
 CONTROLS: Mapping[str, type[Controls]] = MappingProxyType(

@@ -110,6 +110,16 @@ CORRELATION_TIME = Quantity("correlation time", "s", 1e-4, 1e4)
 CORRELATION_LENGTH = Quantity("correlation length", "m", 1e-4, 100.0, "millimetres")
 TIME_STEP_RANGE = Quantity("time step", "s", 1e-5, 0.1, "milliseconds")
 
+# Of a scene, by the names of its fields: disks, frictions, pusher.
+PROPERTIES = {
+    "mass": MASS,
+    "radius": RADIUS,
+    "table_friction": FRICTION,
+    "disk_friction": FRICTION,
+    "pusher_friction": FRICTION,
+    "pusher_radius": PUSHER_RADIUS,
+}
+
 Mass = Annotated[float, MASS.meta]  # kg
 Radius = Annotated[float, RADIUS.meta]  # m
 Friction = Annotated[float, FRICTION.meta]

@@ -11,13 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
-from sainet.scenes.quantities import (
-    FRICTION,
-    MASS,
-    PUSHER_RADIUS,
-    RADIUS,
-    TIME_STEP_RANGE,
-)
+from sainet.scenes.quantities import PROPERTIES, TIME_STEP_RANGE
 
 GRAVITY = 9.81  # m/s^2
 TIME_STEP = 1 / 240  # s, the paper's
@@ -114,16 +108,6 @@ class Scene(eqx.Module):
         return self.mass.shape[:-1]
 
 
-_QUANTITIES = {
-    "mass": MASS,
-    "radius": RADIUS,
-    "table_friction": FRICTION,
-    "disk_friction": FRICTION,
-    "pusher_friction": FRICTION,
-    "pusher_radius": PUSHER_RADIUS,
-}
-
-
 def check_scene(scene: Scene, source: str = "scene") -> None:
     """Raise `BadScene` unless every property is in its range.
 
@@ -134,7 +118,7 @@ def check_scene(scene: Scene, source: str = "scene") -> None:
     Raises:
         BadScene: with the source, the field, the value and its range.
     """
-    for name, quantity in _QUANTITIES.items():
+    for name, quantity in PROPERTIES.items():
         where = f"{source}: {name}"
         quantity.check(getattr(scene, name), where, error=BadScene)
     TIME_STEP_RANGE.check(scene.time_step, f"{source}: time_step", error=BadScene)

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.datasets.config import GenerateConfig
-from sainet.datasets.derive import derive
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
+from sainet.datasets.writer import derive
 from sainet.evaluation.conditions import Condition
 from sainet.scenes.geometry import wrap_angle
 from sainet.studies.paper_setup import NETWORKS, PaperSetup

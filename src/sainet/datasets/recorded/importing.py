@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.datasets.predictions import simulate
+from sainet.datasets.batch import simulate
 from sainet.datasets.recorded.properties import Properties
 from sainet.datasets.recorded.resample import ResampledPush
 from sainet.datasets.schema import (

@@ -22,7 +22,6 @@ from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 _NEWEST_PYTHON = (3, 11)  # with PyBullet wheels
 _FEW = 8  # pushes: up to here, one process is faster than several
 _SHARES = 4  # parts of the work per process, because processes differ in speed
-MOST_DISKS = 30  # one bit per disk in a collision mask of 31; all share the first bit
 
 
 class BulletEngine(AbstractEngine):
@@ -43,16 +42,21 @@ class BulletEngine(AbstractEngine):
         """True: Bullet runs outside JAX."""
         return True
 
+    @property
+    def most_disks(self) -> int:
+        """One disk for each bit of a collision mask of 31; all share the first bit."""
+        return 30
+
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls.
 
         Raises:
             BadScene: the scene has more disks than Bullet has collision groups.
         """
-        if scene.body_count > MOST_DISKS:
+        if scene.body_count > self.most_disks:
             raise BadScene(
                 f"scene has {scene.body_count} disks; Bullet supports at most "
-                f"{MOST_DISKS}. Use fewer disks or the planar engine."
+                f"{self.most_disks}. Use fewer disks or the planar engine."
             )
         batch = scene.batch_shape
         moved = roll_everywhere(_jobs(scene, initial, controls))
