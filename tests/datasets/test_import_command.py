@@ -9,7 +9,7 @@ import pytest
 from datasets.own_pushes import HEADER, PROPERTIES, rows, to_csv, write
 from datasets.raw_pushes import name, pack, recording, to_json
 from sainet.cli.entry import run
-from sainet.datasets import batch, predictions
+from sainet.datasets import batch
 from sainet.datasets.store import open_store
 from sainet.runs.errors import BadStore
 
@@ -106,7 +106,7 @@ def test_a_push_that_an_engine_cannot_follow_is_named(
         motion, pusher = real(trajectory)
         return np.full_like(motion, np.nan), pusher
 
-    monkeypatch.setattr(predictions, "from_trajectory", broken)
+    monkeypatch.setattr(batch, "from_trajectory", broken)
     table, bodies = write(tmp_path / "in", to_csv(rows("a-7")))
     words = ["import", "table", str(table), "--properties", str(bodies)]
     out = tmp_path / "out"

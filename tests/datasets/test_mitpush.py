@@ -334,8 +334,9 @@ from sainet.datasets.recorded import endpoints, importing
 importing._CHUNK_SIZE = 1
 write_chunk = writer.write_chunk
 def slow(*arguments):
-    write_chunk(*arguments)
+    index = write_chunk(*arguments)
     time.sleep(0.3)
+    return index
 if sys.argv[3] == "slow":
     writer.write_chunk = slow
 endpoints.import_endpoints(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -8,7 +8,7 @@ import pytest
 from datasets.stores import small
 from sainet.datasets.batch import to_batch, to_controls, to_initial, to_scene
 from sainet.datasets.generate import simulate_chunk, store_info
-from sainet.datasets.schema import sizes, variables
+from sainet.datasets.schema import variables
 from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.scene import TIME_STEP
 from sainet.scenes.shapes import pair_gaps, pusher_gaps
@@ -36,8 +36,7 @@ def test_a_chunk_has_every_array_in_its_shape(setup):
     arrays, info = chunk(setup)
     assert arrays.keys() == variables(info).keys()
     for name, variable in variables(info).items():
-        wanted = tuple(sizes(info)[d] for d in variable.dimensions)
-        assert arrays[name].shape == wanted, name
+        assert arrays[name].shape == variable.shape(info), name
         assert np.isfinite(arrays[name]).all(), name
 
 

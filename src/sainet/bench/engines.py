@@ -10,7 +10,7 @@ import jax
 
 from sainet.bench import Figures
 from sainet.bench.timing import check_runs, median_seconds
-from sainet.datasets.batch import to_controls, to_initial, to_scene
+from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import simulate_chunk, store_info
 from sainet.engines.base import AbstractEngine
@@ -93,6 +93,5 @@ def _pushes(batch: int, steps: int) -> Pushes:
     config = GenerateConfig(
         pushes=batch, chunk_size=batch, hold_steps=_HOLD_STEPS, noise_level="none"
     )
-    info, arrays = store_info(config), simulate_chunk(config, 0)
-    controls = to_controls(arrays, info, slice(steps))
-    return to_scene(arrays, info), to_initial(arrays), controls
+    batch = to_batch(simulate_chunk(config, 0), store_info(config), steps=steps)
+    return batch.scene, batch.initial, batch.controls

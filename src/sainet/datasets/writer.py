@@ -121,7 +121,7 @@ def _write(
     missing = missing_chunks(folder, info)
     on_pushes(info.pushes - sum(map(info.chunk_length, missing)))
     jobs = [(folder, info, index, make_chunk) for index in missing]
-    for index in each_done(executor, _write_chunk, jobs):
+    for index in each_done(executor, write_chunk, jobs):
         on_pushes(info.chunk_length(index))
     hashes: Hashes = {}
     for index in range(info.chunks):
@@ -160,7 +160,7 @@ def _create_arrays(folder: Path, info: StoreInfo) -> None:
         raise write_error(folder / ARRAYS, error) from error
 
 
-def _write_chunk(
+def write_chunk(
     folder: Path, info: StoreInfo, index: int, make_chunk: MakeChunk
 ) -> int:
     """Make and write one chunk of every array, then its receipt; return its index."""
@@ -177,13 +177,14 @@ def _write_chunk(
         raise write_error(folder / ARRAYS, error) from error
     hashes = {
         name: content_hash((folder / ARRAYS / name).read_bytes())
-        for name in _chunk_files(info, index)
+        for name in chunk_files(info, index)
     }
     write_document(_receipt(folder, index), Listing(files=hashes))
     return index
 
 
-def _chunk_files(info: StoreInfo, index: int) -> list[str]:
+def chunk_files(info: StoreInfo, index: int) -> list[str]:
+    """Return the files of one chunk, relative to the folder of the arrays."""
     return [chunk_file(name, each, index) for name, each in variables(info).items()]
 
 
@@ -203,7 +204,7 @@ def _is_written(folder: Path, info: StoreInfo, index: int) -> bool:
         receipt = read_document(_receipt(folder, index), Listing).files
     except BadInput:
         return False
-    paths = {name: folder / ARRAYS / name for name in _chunk_files(info, index)}
+    paths = {name: folder / ARRAYS / name for name in chunk_files(info, index)}
     return all(
         path.is_file() and content_hash(path.read_bytes()) == receipt.get(name)
         for name, path in paths.items()
