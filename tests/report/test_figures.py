@@ -11,7 +11,7 @@ from report import samples
 from sainet.report.figures.canvas import spread
 from sainet.report.figures.learning import draw_learning_curve, running_mean
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
-from sainet.report.pages.templates import read
+from sainet.report.pages import read
 from sainet.report.palette import css_variables, style_of, styles_of
 from sainet.report.replay import Replay, Track
 

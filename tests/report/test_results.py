@@ -51,14 +51,18 @@ def test_a_text_without_a_place_for_its_block_is_refused():
 def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
     for name in ("results", TEMPLATES):
         (tmp_path / name).mkdir(parents=True)
-    for name in ("index", "readme-block", "benchmarks"):
+    for name in ("readme-block", "benchmarks"):
         text = (
-            "# Timings\n\n{{ plain('benchmarks') }}" if name == "benchmarks" else name
+            "{% set title = 'Timings' %}{{ plain('benchmarks') }}"
+            if name == "benchmarks"
+            else name
         )
         (tmp_path / TEMPLATES / f"{name}.md.j2").write_text(text)
+    index = "{% for name, title in titles.items() %}{{ name }}: {{ title }}{% endfor %}"
+    (tmp_path / TEMPLATES / "index.md.j2").write_text(index)
     shutil.copy(REPOSITORY / "results" / "benchmarks.tables.json", tmp_path / "results")
     (tmp_path / "README.md").write_text(f"{BEGIN}{END}")
     pages = {path.name: text for path, text in rendered(tmp_path).items()}
     assert pages["README.md"] == f"{BEGIN}readme-block\n{END}"
     assert "| `devices` |" in pages["benchmarks.md"]
-    assert pages["index.md"] == "index\n"
+    assert pages["index.md"] == "benchmarks.md: Timings\n"

@@ -25,7 +25,7 @@ class Identify:
         use_devices(None)
         from sainet.datasets.store import open_store
         from sainet.identification.identify import identify_into
-        from sainet.report.estimates import print_estimates
+        from sainet.report.writers import print_estimates
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)

@@ -14,6 +14,7 @@ from sainet.models.identity import ModelId
 
 Status = Literal["holds", "does not hold", "not testable here"]
 CHANCE = 0.05  # p below which trials differ
+TRUE_PROPERTIES = "physics-true"
 LEVEL = 1e-3  # relative difference below which two errors are the same
 
 
@@ -178,7 +179,7 @@ def best_network(summary: Summary, condition: str) -> Comparative | None:
         each for each in factors if ids[each.model].kind not in ("physics", "published")
     ]
     hybrids = [each for each in networks if ids[each.model].kind == "sain"]
-    true = by_model.get("physics-true")
+    true = by_model.get(TRUE_PROPERTIES)
     if true is not None and abs(true.error - true.baseline) < LEVEL * true.baseline:
         true = None  # true masses and radii make no difference here
     rivals = hybrids or networks or ([true] if true else [])
@@ -195,7 +196,7 @@ def best_network(summary: Summary, condition: str) -> Comparative | None:
 
 
 def _is_other(factor: Factor, ids: dict[str, ModelId]) -> bool:
-    return factor.model not in (BASELINE, "physics-true") and (
+    return factor.model not in (BASELINE, TRUE_PROPERTIES) and (
         ids[factor.model].kind != "published" or bool(ids[factor.model].name)
     )
 

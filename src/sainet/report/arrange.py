@@ -7,19 +7,23 @@ model of a column marked, published numbers apart, and sentences below.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from sainet.evaluation.claims import LEVEL
+from sainet.evaluation.claims import LEVEL, TRUE_PROPERTIES
+from sainet.evaluation.conditions import PublishedValues
 from sainet.evaluation.metrics import METRICS, Metric
-from sainet.evaluation.summary import BASELINE, Comparison, Estimate, Row, Summary
+from sainet.evaluation.summary import BASELINE, Estimate, Row, Summary
+from sainet.evaluation.trials import TrialRow
 from sainet.models.identity import ModelId
-from sainet.report.arrange_trials import arrange_trials
 from sainet.report.palette import labels_of
 from sainet.report.table import DASH, Cell, Column, Line, Table
-from sainet.report.verdicts import verdicts_on
+from sainet.report.verdicts import comparisons, trial_sentences, verdicts_on
 
-TRUE_PROPERTIES = "physics-true"
 # Means over the steps of a push, then its end: blocks of a terminal's width.
 _STEPS = ("trans_percent", "pos_mm", "rot_deg")
 _ENDS = ("final_pos_mm", "final_rot_deg", "relative_percent")
+_TRIAL_HEADINGS = (
+    *("solved", "success (95 %)", "pushes (median)"),
+    *("within 25 pushes", "within 4 mm", "decision (s)"),
+)
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class _Values:
 def arrange(summary: Summary) -> Table:
     """Return the table of a summary; columns without any number are left out."""
     if summary.is_of_trials:
-        return arrange_trials(summary)
+        return _arrange_trials(summary)
     every, notes = _without_twins([*_measured(summary)], summary)
     theirs = [*_predicted(summary), *_published(summary)]
     metrics = _used(every, theirs)
@@ -53,7 +57,7 @@ def arrange(summary: Summary) -> Table:
         columns=columns,
         lines=tuple(_mark_best(every, lines, metrics)),
         published=tuple(_line(v, metrics, bodies, labels, "") for v in theirs),
-        sentences=(*notes, *_comparisons(summary, {v.model.slug for v in every})),
+        sentences=(*notes, *comparisons(summary, {v.model.slug for v in every})),
         verdicts=verdicts_on(summary),
     )
 
@@ -208,41 +212,36 @@ def _is_best(cell: Cell, column: Sequence[Cell], direction: str) -> bool:
     return float(cell.text) == best
 
 
-def _comparisons(summary: Summary, shown: set[str]) -> Iterator[str]:
-    """Yield by how much each model differs from another, a sentence for each pair."""
-    labels = labels_of(summary.models)
-    pairs: dict[tuple[str, str, str], dict[str, list[Comparison]]] = {}
-    for each in _worth_showing(summary, shown):
-        found = pairs.setdefault((each.condition, each.model, each.against), {})
-        found.setdefault(each.metric, []).append(each)
-    for (condition, model, against), metrics in pairs.items():
-        amounts = "; ".join(
-            f"{METRICS[key].name} {' / '.join(map(_difference, rows))} "
-            f"{METRICS[key].unit}"
-            for key, rows in metrics.items()
-        )
-        where = f"{condition}: " if condition else ""
-        yield f"{where}{labels[model]} minus {labels[against]}: {amounts}"
+def _arrange_trials(summary: Summary) -> Table:
+    labels = labels_of([*summary.models, *(p.model for p in summary.published)])
+    return Table(
+        columns=tuple(Column(heading, heading) for heading in _TRIAL_HEADINGS),
+        lines=tuple(_trial_line(row, labels) for row in summary.trials),
+        published=tuple(_published_trials(each, labels) for each in summary.published),
+        sentences=tuple(trial_sentences(summary)),
+        verdicts=verdicts_on(summary),
+        samples="Trials",
+        note="",
+    )
 
 
-def _worth_showing(summary: Summary, shown: set[str]) -> list[Comparison]:
-    """Return the comparisons that a reader needs; the JSON contains all.
-
-    Beside true-property physics a comparison with physics adds little, and the end of
-    a push repeats its mean; where nothing else was compared, these are kept.
-    """
-    hidden = "" if TRUE_PROPERTIES in shown else TRUE_PROPERTIES
-    every = [e for e in summary.comparisons if hidden not in (e.model, e.against)]
-    less = BASELINE if TRUE_PROPERTIES in shown else ""
-    steps = [each for each in every if not METRICS[each.metric].is_of_end]
-    return [each for each in steps if each.against != less] or steps or every
-
-
-def _difference(comparison: Comparison) -> str:
-    low, high = comparison.difference.low, comparison.difference.high
-    interval = f" [{_signed(low)}, {_signed(high)}]" if low is not None else ""
-    return _signed(comparison.difference.value) + interval
+def _trial_line(row: TrialRow, labels: Mapping[str, str]) -> Line:
+    low, high = row.interval
+    texts = (
+        f"{row.solved}/{row.trials}",
+        f"{low:.0%}{DASH}{high:.0%}",
+        DASH if row.median_pushes is None else f"{row.median_pushes:g}",
+        f"{row.within_25_pushes:.0%}",
+        f"{row.within_4_mm:.0%}",
+        DASH if row.median_decision_s is None else f"{row.median_decision_s:.3f}",
+    )
+    cells = tuple(map(Cell, texts))
+    return Line(row.condition, row.model, labels[row.model], cells)
 
 
-def _signed(value: float | None) -> str:
-    return DASH if value is None else f"{value:+.3f}".replace("-", "−")  # noqa: RUF001
+def _published_trials(each: PublishedValues, labels: Mapping[str, str]) -> Line:
+    trials = each.trials or 0
+    solved = f"{round((each.values['success'][0] or 0) * trials)}/{trials}"
+    cells = (Cell(solved), *[Cell(DASH)] * (len(_TRIAL_HEADINGS) - 1))
+    slug = each.model.slug
+    return Line(each.condition, slug, f"{labels[slug]}, published", cells)

@@ -1,9 +1,11 @@
-"""Verdicts in words: which model is better than which, and by how much."""
+"""Sentences below tables: comparisons, and verdicts on which model is better."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from sainet.evaluation.claims import (
+    CHANCE,
     PUBLISHED_ORDER,
+    TRUE_PROPERTIES,
     Claim,
     Places,
     best_network,
@@ -12,9 +14,11 @@ from sainet.evaluation.claims import (
     sign,
 )
 from sainet.evaluation.metrics import METRICS
-from sainet.evaluation.summary import Comparison, Summary
-from sainet.report.pages.templates import render_text
+from sainet.evaluation.summary import BASELINE, Comparison, Summary
+from sainet.evaluation.trials import TrialTest
+from sainet.report.pages import render_text
 from sainet.report.palette import labels_of
+from sainet.report.table import DASH
 
 
 def verdicts_on(summary: Summary) -> tuple[str, ...]:
@@ -59,6 +63,72 @@ def beside_published(summary: Summary) -> str:
     labels, names = labels_of(summary.models), {k: m.name for k, m in METRICS.items()}
     ratios = list(over_published(summary))
     return f"{ruling} " + _worded("ratios", labels=labels, names=names, ratios=ratios)
+
+
+def comparisons(summary: Summary, shown: set[str]) -> Iterator[str]:
+    """Yield by how much each model differs from another, a sentence for each pair."""
+    labels = labels_of(summary.models)
+    pairs: dict[tuple[str, str, str], dict[str, list[Comparison]]] = {}
+    for each in _worth_showing(summary, shown):
+        found = pairs.setdefault((each.condition, each.model, each.against), {})
+        found.setdefault(each.metric, []).append(each)
+    for (condition, model, against), metrics in pairs.items():
+        amounts = "; ".join(
+            f"{METRICS[key].name} {' / '.join(map(_difference, rows))} "
+            f"{METRICS[key].unit}"
+            for key, rows in metrics.items()
+        )
+        where = f"{condition}: " if condition else ""
+        yield f"{where}{labels[model]} minus {labels[against]}: {amounts}"
+
+
+def _worth_showing(summary: Summary, shown: set[str]) -> list[Comparison]:
+    """Return the comparisons that a reader needs; the JSON contains all.
+
+    Beside true-property physics a comparison with physics adds little, and the end of
+    a push repeats its mean; where nothing else was compared, these are kept.
+    """
+    hidden = "" if TRUE_PROPERTIES in shown else TRUE_PROPERTIES
+    every = [e for e in summary.comparisons if hidden not in (e.model, e.against)]
+    less = BASELINE if TRUE_PROPERTIES in shown else ""
+    steps = [each for each in every if not METRICS[each.metric].is_of_end]
+    return [each for each in steps if each.against != less] or steps or every
+
+
+def _difference(comparison: Comparison) -> str:
+    low, high = comparison.difference.low, comparison.difference.high
+    interval = f" [{_signed(low)}, {_signed(high)}]" if low is not None else ""
+    return _signed(comparison.difference.value) + interval
+
+
+def _signed(value: float | None) -> str:
+    return DASH if value is None else f"{value:+.3f}".replace("-", "−")  # noqa: RUF001
+
+
+def trial_sentences(summary: Summary) -> Iterator[str]:
+    """Yield what noise ended early, and which goals only one model of two reached."""
+    labels = labels_of(summary.models)
+    for row in summary.trials:
+        if row.ended_early:
+            yield (
+                f"{row.condition}, {labels[row.model]}: {row.ended_early} of "
+                f"{row.trials - row.solved} unsolved trials ended because the measured "
+                "pose was within the tolerance"
+            )
+    for test in filter(_is_reported, summary.tests):
+        yield (
+            f"{test.condition}, {test.measure.replace('_', ' ')}: "
+            f"only {labels[test.model]} {test.only_one}, "
+            f"only {labels[test.against]} {test.only_other} "
+            f"(exact McNemar p = {test.p:.2g})"
+        )
+
+
+def _is_reported(test: TrialTest) -> bool:
+    """Report every difference in success, and of other measures what is not chance."""
+    if test.measure == "solved":
+        return bool(test.only_one or test.only_other)
+    return test.p < CHANCE
 
 
 def worded_places(found: Places, summary: Summary) -> str:

@@ -11,11 +11,13 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from sainet.report.pages.templates import render
+from sainet.models.card import Identified
+from sainet.report.pages import render
 from sainet.report.palette import styles_of
 from sainet.report.table import EMPTY, Cell, Column, Line, Table
 
 _ANY_WIDTH = 10_000  # characters
+_ESTIMATE_HEADINGS = ("parameter", "before", "value", "95 % interval")
 
 
 def print_table(table: Table, console: Console) -> None:
@@ -97,6 +99,40 @@ def _names(table: Table, line: Line) -> list[str]:
     first = [line.condition] if table.has_conditions else []
     count = ["" if line.count is None else str(line.count)] if table.has_counts else []
     return [*first, line.label, *count]
+
+
+def print_estimates(found: Identified, console: Console) -> None:
+    """Print each estimate, parameters that are not identifiable, and the errors.
+
+    Args:
+        found: what was identified.
+        console: to print on.
+    """
+    table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, heading in enumerate(_ESTIMATE_HEADINGS):
+        table.add_column(heading, justify="right" if index else "left")
+    for estimate in found.estimates:
+        told = not estimate.doubt
+        interval = f"{estimate.low:.3g} to {estimate.high:.3g}"
+        cells = (
+            estimate.name.replace("_", " "),
+            f"{estimate.start:.3g}",
+            f"{estimate.value:.3g}" if told else "kept",
+            interval if told else "–",
+        )
+        table.add_row(*map(Text, cells))
+    console.print(table)
+    for estimate in found.estimates:
+        if estimate.doubt:
+            name = estimate.name.replace("_", " ")
+            console.print(Text(f"{name} is not identifiable: {estimate.doubt}."))
+    console.print(
+        Text(
+            f"Mean errors where {found.pushes} pushes were observed: position "
+            f"{found.before_mm:.2f} mm before, {found.after_mm:.2f} mm after; "
+            f"rotation {found.before_deg:.2f} and {found.after_deg:.2f} degrees."
+        )
+    )
 
 
 def to_html(table: Table) -> str:

@@ -2,13 +2,15 @@
 
     python -m sainet.report.pages.results
 
-Prose stands in the templates in ``docs/templates``; numbers come from measurements.
+Prose stands in the templates in ``docs/templates``, which set their titles; numbers
+come from measurements.
 """
 
 import re
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import jinja2
 import msgspec
@@ -42,6 +44,13 @@ class PlainTables(msgspec.Struct, frozen=True):
     machine: str
     tables: tuple[PlainTable, ...]
     titles: tuple[str, ...] = ()
+
+
+class Page(NamedTuple):
+    """A rendered page; its template sets its title."""
+
+    title: str
+    text: str
 
 
 class Evidence:
@@ -192,27 +201,23 @@ def rendered(root: Path) -> dict[Path, str]:
         autoescape=False,  # noqa: S701  (Markdown from our own templates)
     )
     environment.globals.update(Evidence(root).helpers)
-    names = sorted(path.name.removesuffix(".j2") for path in templates.glob("*.md.j2"))
-    texts = {
-        name: environment.get_template(f"{name}.j2").render().strip() + "\n"
-        for name in names
-        if name != _INDEX
+    pages = {
+        path.stem: _page(environment.get_template(path.name))
+        for path in sorted(templates.glob("*.md.j2"))
+        if path.stem != _INDEX
     }
-    block = texts.pop(_README)
-    titles = {
-        k: text.partition("\n")[0].removeprefix("# ") for k, text in texts.items()
-    }
-    index = environment.get_template(f"{_INDEX}.j2").render(titles=titles)
-    pages = {root / PAGES / name: text for name, text in texts.items()}
+    block = pages.pop(_README)
+    titles = {name: page.title for name, page in pages.items()}
+    pages[_INDEX] = _page(environment.get_template(f"{_INDEX}.j2"), titles=titles)
     readme = root / "README.md"
-    return pages | {
-        root / PAGES / _INDEX: index.strip() + "\n",
-        readme: with_block(readme.read_text("utf-8"), block),
+    return {root / PAGES / name: page.text for name, page in pages.items()} | {
+        readme: with_block(readme.read_text("utf-8"), block.text)
     }
 
 
-def _title(text: str) -> str:
-    return text.partition("\n")[0].removeprefix("# ")
+def _page(template: jinja2.Template, **values: object) -> Page:
+    module = template.make_module(values)
+    return Page(vars(module).get("title", ""), str(module).strip() + "\n")
 
 
 def with_block(text: str, block: str) -> str:
