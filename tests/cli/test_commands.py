@@ -191,7 +191,7 @@ def test_train_and_evaluate(pushes, tmp_path):
     assert (out / "learning-curve.svg").stat().st_size > 0
     words = ("--model", "physics", out, "--data", pushes, "--json", "--quiet")
     error = sainet("evaluate", *words, status=2).stderr
-    assert f"{out}/card.json: data_seeds has 0" in error
+    assert f"{out}/card.json: the network was trained on " in error
     assert len(error.splitlines()) == 1
     result = json.loads(sainet("evaluate", *words, "--force").stdout)
     assert {row["model"] for row in result["rows"]} == {"physics", "net"}

@@ -16,7 +16,7 @@ from sainet.models.library import (
 from sainet.runs.documents import read_json
 from support import require
 
-SAME = ("identity", "kind", "time_step", "truth_engine", "camera", "data_seeds")
+SAME = ("identity", "kind", "time_step", "truth_engine", "camera")
 SAME += ("recurrent", "residual", "format_version")
 SMALLER = ("iterations", "batch_size")
 

@@ -93,5 +93,5 @@ def _pushes(batch: int, steps: int) -> Pushes:
     config = GenerateConfig(
         pushes=batch, chunk_size=batch, hold_steps=_HOLD_STEPS, noise_level="none"
     )
-    batch = to_batch(simulate_chunk(config, 0), store_info(config), steps=steps)
-    return batch.scene, batch.initial, batch.controls
+    made = to_batch(simulate_chunk(config, 0), store_info(config), steps=steps)
+    return made.scene, made.initial, made.controls

@@ -63,11 +63,13 @@ def to_batch(
         simulated: internal engine whose prediction to include.
     """
     known = variables(info)
-    names = [*input_names(info), *([simulated_name(simulated)] if simulated else [])]
-    cut = {}
-    for name in names:
-        has_time = name not in known or "time" in known[name].dimensions
-        cut[name] = arrays[name][:, :steps] if has_time else arrays[name]
+    timed = {name for name, each in known.items() if "time" in each.dimensions}
+    # A computed prediction is no variable of the store.
+    predicted = simulated_name(simulated) if simulated else ""
+    cut = {
+        name: array[:, :steps] if name in timed or name == predicted else array
+        for name, array in arrays.items()
+    }
     exists = np.arange(cut["truth"].shape[1])[None] < arrays["steps"][:, None]
     return PushBatch(
         scene=to_scene(arrays, info),
@@ -77,7 +79,7 @@ def to_batch(
         measured=jnp.asarray(cut.get("measured", cut["truth"])[..., :3]),
         pose_observed=jnp.asarray((cut["pose_observed"] > 0) & exists),
         rate_observed=jnp.asarray((cut["rate_observed"] > 0) & exists),
-        simulated=jnp.asarray(cut[names[-1]]) if simulated else None,
+        simulated=jnp.asarray(cut[predicted]) if simulated else None,
     )
 
 
@@ -117,26 +119,27 @@ class Prediction:
     info: StoreInfo  # of the pushes
 
     @property
-    def _name(self) -> str:
+    def name(self) -> str:
+        """The name of its array."""
         return simulated_name(self.internal.simulator.stored_as)
 
     @property
     def is_stored(self) -> bool:
         """Whether the store contains the prediction."""
         # A camera offset displaces the pusher.
-        return not self.internal.camera and self._name in variables(self.info)
+        return not self.internal.camera and self.name in variables(self.info)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The arrays of the store that a batch with the prediction reads."""
-        stored = (self._name,) if self.is_stored else ()
+        stored = (self.name,) if self.is_stored else ()
         return (*input_names(self.info), *stored)
 
     def complete(self, arrays: Arrays) -> Arrays:
         """Return arrays with the prediction, computed if they lack it."""
-        if self._name in arrays:
+        if self.name in arrays:
             return arrays
-        return arrays | {self._name: _roll_out(self.internal, arrays, self.info)}
+        return arrays | {self.name: _roll_out(self.internal, arrays, self.info)}
 
     def batch(self, arrays: Arrays, steps: int | None = None) -> PushBatch:
         """Return a batch with the prediction, its pusher in camera coordinates.

@@ -20,7 +20,7 @@ from sainet.datasets.batch import simulate
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name, variables
 from sainet.datasets.store import Store
 from sainet.datasets.writer import derive
-from sainet.engines.simulator import simulator_named
+from sainet.engines.simulator import stored_simulator
 from sainet.runs.errors import BadStore
 
 TOUCHING = 0.5  # fraction of the attempts that touch another disk
@@ -122,7 +122,7 @@ def _append(array: np.ndarray, values: np.ndarray | None, axis: int) -> np.ndarr
 def _simulate(
     engine: str, arrays: Arrays, info: StoreInfo, on_pushes: Callable[[int], None]
 ) -> np.ndarray:
-    parts, simulator = [], simulator_named(engine)
+    parts, simulator = [], stored_simulator(engine)
     for index in range(info.chunks):
         rows = info.chunk_slice(index)
         chunk = {name: array[rows] for name, array in arrays.items()}

@@ -133,3 +133,15 @@ def simulator_named(name: str) -> SimulatorSpec:
     if name not in SIMULATORS:
         raise unknown_name("simulator", name, SIMULATORS)
     return SIMULATORS[name]
+
+
+def stored_simulator(name: str) -> SimulatorSpec:
+    """Return the specification whose predictions have a name in datasets.
+
+    Raises:
+        UnknownName: there is none, for example because its engine has a later version.
+    """
+    known = {spec.stored_as: spec for spec in SIMULATORS.values()}
+    if name not in known:
+        raise unknown_name("simulator", name, known)
+    return known[name]

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sainet.datasets.batch import PushBatch, to_batch
-from sainet.datasets.schema import published_name, simulated_name, variables
+from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
 from sainet.evaluation.conditions import Condition, Header, Provenance, TestSet
@@ -23,7 +23,7 @@ from sainet.evaluation.metrics import (
     push_errors,
     travel_mm,
 )
-from sainet.models.dynamics import AbstractDynamics
+from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
 from sainet.models.library import Model
 from sainet.runs.errors import BadInput, Diverged
@@ -60,7 +60,8 @@ def evaluate(
             f"`model`: {', '.join(names)} are not all different; rename one."
         )
     info = store.info
-    hashes = store.push_hashes() if info.is_recorded and not force else None
+    trained = any(model.card is not None for model in models)
+    hashes = store.push_hashes() if trained and not force else None
     for model in () if force else models:
         model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
     arrays = _read(store)
@@ -131,9 +132,11 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
 
 
 def _read(store: Store) -> dict[str, np.ndarray]:
-    unused = {simulated_name(engine) for engine in store.info.assumed_engines}
-    names = tuple(n for n in variables(store.info) if n not in {*unused, "measured"})
-    return store.read(slice(None), names)
+    """Return the arrays that every model needs: no prediction, no measured pose."""
+    info = store.info
+    names = [name for name in input_names(info) if name != "measured"]
+    published = map(published_name, info.published)
+    return store.read(slice(None), (*names, "group", *published))
 
 
 def _limit(store: Store, steps: int | None) -> int:
@@ -171,13 +174,18 @@ def _predict_all(
     on_pushes: Callable[[str, int], None],
 ) -> list[np.ndarray]:
     """Return the predicted poses of each part, ``[push, time, body, 3]``."""
-    poses = []
+    poses, stored = [], None
+    if model.internal and (known := store.prediction(model.internal)).is_stored:
+        arrays = arrays | store.read(slice(None), (known.name,))
+        stored = model.internal.simulator.stored_as
     for part, steps in parts:
         found = []
         for start in range(0, len(part), _BATCH):
             rows = part[start : start + _BATCH]
             whole = np.resize(rows, min(_BATCH, len(part)))
-            batch = to_batch(_rows(arrays, whole), store.info, steps=steps)
+            batch = to_batch(
+                _rows(arrays, whole), store.info, steps=steps, simulated=stored
+            )
             pose = _predict(model.dynamics, batch)
             found.append(np.asarray(pose, np.float64)[: len(rows)])
             on_pushes(model.name, len(rows))
@@ -204,7 +212,7 @@ def _rows(arrays: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarr
 
 
 def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:
-    if dynamics.on_host:  # it uses every core by itself
+    if dynamics.on_host and batch.simulated is None:  # it uses every core by itself
         return _predict_pose(dynamics, batch)
     return over_devices(_predict_pose, dynamics, batch)
 
@@ -212,8 +220,11 @@ def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:
 def _predict_pose(
     dynamics: AbstractDynamics, batch: PushBatch
 ) -> Float[Array, "push time body 3"]:
+    stored = batch.simulated
+    if stored is not None:
+        stored = stored_prediction(stored, batch.initial, batch.controls)
     carry = dynamics.begin(batch.scene, batch.initial)
-    _, trajectory = dynamics.advance(batch.scene, carry, batch.controls)
+    _, trajectory = dynamics.advance(batch.scene, carry, batch.controls, stored)
     states = trajectory.states
     return jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
 

@@ -228,7 +228,6 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
     info, sain, history = task.store.info, task.model == "sain", progress.history
     data = save_arrays(folder.path / WEIGHTS, progress.network)
     start = task.existing.card if task.existing else None
-    seeds = () if start is None else start.data_seeds
     card = Card(
         identity=_identity(task),
         kind=info.kind,
@@ -236,7 +235,7 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         truth_engine=info.engine,
         camera=task.assumed.camera if sain else AGREES,
         data=task.store.content,
-        data_seeds=seeds if info.seed is None else (*seeds, info.seed),
+        data_seeds=start.data_seeds if start else (),
         pushes=_pushes(task.store, start),
         weights=content_hash(data),
         started_from=start.weights if start else None,
@@ -273,7 +272,6 @@ def _training_data(task: Task) -> TrainingData:
 
 
 def _pushes(store: Store, start: Card | None) -> str:
-    """Return the recorded pushes that the network was ever trained on."""
+    """Return the pushes that the network was ever trained on, as far as known."""
     before = digests_from_text(start.pushes if start else "")
-    own = store.push_hashes() if store.info.is_recorded else before[:0]
-    return digests_to_text(np.concatenate([before, own]))
+    return digests_to_text(np.concatenate([before, store.push_hashes()]))

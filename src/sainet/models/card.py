@@ -26,8 +26,8 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     truth_engine: str  # that made the training data, or "recorded"
     camera: CameraOffset = AGREES  # of the internal engine
     data: str  # hash of the training data
-    data_seeds: tuple[int, ...] = ()  # of all simulated training pushes, oldest first
-    pushes: str = ""  # all recorded training pushes (`runs.digests`)
+    data_seeds: tuple[int, ...] = ()  # of simulated training pushes not in `pushes`
+    pushes: str = ""  # training pushes (`runs.digests`)
     weights: str  # hash of the weights' file
     started_from: str | None = None  # hash of the weights that training began with
     recurrent: bool = True  # False: trained on single steps

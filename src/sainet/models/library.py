@@ -48,6 +48,7 @@ class Model:
     card: Card | None = None
     folder: Path | None = None  # of a trained network or identified parameters
     digest: str | None = None  # hash of the weights or the identified parameters
+    internal: InternalEngine | None = None  # that predicts s-bar for the dynamics
 
     @property
     def name(self) -> str:
@@ -68,7 +69,7 @@ class Model:
             kind: setup of the pushes.
             time_step: of the pushes (s).
             seed: of simulated test pushes; None otherwise.
-            pushes: hashes of recorded test pushes (`Store.push_hashes`), if any.
+            pushes: hashes of the test pushes (`Store.push_hashes`); None: unknown.
         """
         if self.card is None:
             return
@@ -135,13 +136,16 @@ def load_model(name: str, *, engine: str | None = None, force: bool = False) -> 
         return _identified_physics(folder, engine)
     network, card = load_network(folder)
     dynamics: AbstractDynamics = LearnedDynamics(network)
+    internal = None
     if card.identity.simulator is not None:
         simulator = _internal(folder, card, card.identity.simulator, engine, force)
+        internal = InternalEngine(simulator, card.camera)
         dynamics = SimulatorAugmented(network, simulator.build())
     if not card.recurrent:
-        dynamics = _restarted(folder, dynamics)
+        dynamics, internal = _restarted(folder, dynamics), None
     dynamics = with_camera(dynamics, card.camera)
-    return Model(named(card.identity, folder), dynamics, card, folder, card.weights)
+    identity = named(card.identity, folder)
+    return Model(identity, dynamics, card, folder, card.weights, internal)
 
 
 def named(identity: ModelId, folder: Path) -> ModelId:
@@ -160,7 +164,8 @@ def _physics(name: str, engine: str) -> Model:
         raise unknown_name("engine", engine, known)
     simulator = simulator_named(known[engine])
     identity = ModelId(kind="physics", simulator=simulator)
-    return Model(identity, PhysicsDynamics(simulator.build()))
+    dynamics = PhysicsDynamics(simulator.build())
+    return Model(identity, dynamics, internal=InternalEngine(simulator))
 
 
 def _identified_physics(folder: Path, engine: str | None) -> Model:
@@ -174,7 +179,7 @@ def _identified_physics(folder: Path, engine: str | None) -> Model:
     physics = PhysicsDynamics(internal.simulator.build())
     digest = content_hash(read_file(folder / IDENTIFIED))
     dynamics = with_camera(physics, internal.camera)
-    return Model(named(identity, folder), dynamics, None, folder, digest)
+    return Model(named(identity, folder), dynamics, None, folder, digest, internal)
 
 
 def network_folder(name: str) -> Path:

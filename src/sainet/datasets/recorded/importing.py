@@ -20,7 +20,7 @@ from sainet.datasets.schema import (
 )
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import write_once
-from sainet.engines.simulator import simulator_named
+from sainet.engines.simulator import simulator_named, stored_simulator
 from sainet.scenes.recording import Conditions
 from sainet.scenes.scene import TIME_STEP
 
@@ -91,7 +91,7 @@ def store_info(
         chunk_size=max(1, min(_CHUNK_SIZE, limit)),
         time_step=TIME_STEP,
         engine=RECORDED,
-        assumed_engines=engines,
+        assumed_engines=tuple(simulator_named(e).stored_as for e in engines),
         groups=tuple(sorted({group_name(push.conditions) for push in pushes} - {""})),
         published=published,
         has_repeats=all(push.plan for push in pushes),
@@ -123,7 +123,7 @@ def chunk_arrays(
     }
     names = [push.source for push in pushes]
     simulated = {
-        simulated_name(engine): simulate(simulator_named(engine), arrays, info, names)
+        simulated_name(engine): simulate(stored_simulator(engine), arrays, info, names)
         for engine in info.assumed_engines
     }
     return arrays | simulated
