@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet import Scene, load_model
-from sainet.control.episode import Turn, run_episode
+from sainet.control.episode import ControlStep, run_episode
 from sainet.engines import make_engine
 from sainet.planning import make_planner
 from sainet.robots.simulated import SimulatedRobot
@@ -26,15 +26,15 @@ robot = SimulatedRobot(world, scene, state)
 task = PushToGoal(touching[1] + jnp.array([0.10, 0.02]))
 
 
-def tell(turn: Turn) -> None:
+def tell(step: ControlStep) -> None:
     """Say what was planned and how far the goal was."""
     push = np.rad2deg(
-        [turn.plan.pushes[0].contact_angle, turn.plan.pushes[0].direction]
+        [step.plan.pushes[0].contact_angle, step.plan.pushes[0].direction]
     )
-    away = 1000 * task.distance(turn.observed)
+    away = 1000 * task.distance(step.observed)
     print(f"{away:6.1f} mm to go: contact {push[0]:+.0f}, direction {push[1]:+.0f} deg")
 
 
 sain = load_model("sain").dynamics
-episode = run_episode(robot, make_planner("greedy"), sain, task, scene, on_turn=tell)
-print(f"{episode.reason} after {len(episode.turns)} pushes")
+episode = run_episode(robot, make_planner("greedy"), sain, task, scene, on_step=tell)
+print(f"{episode.reason} after {len(episode.steps)} pushes")

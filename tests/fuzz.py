@@ -337,7 +337,7 @@ def make_control(out: Path) -> None:
     write_json(out / "manifest.json", {"versions": {"sainet": "0.1.0"}})
     names = [f"episodes/{trial:03d}.json" for trial in range(3)]
     for trial, name in enumerate(names):
-        write_json(out / name, samples.record(trial=trial))
+        write_json(out / name, samples.record_json(trial=trial))
     write_json(out / "episodes.json", {"episodes": names})
 
 
@@ -351,7 +351,7 @@ def read_episode(out: Path) -> None:
     from sainet.control.record import read_record
 
     for path in sorted((out / "episodes").glob("*.json")):
-        numbers_of(read_record(path))
+        numbers_of(msgspec.to_builtins(read_record(path)))
 
 
 # --------------------------------------------------------------------------- tables

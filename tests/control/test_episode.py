@@ -77,14 +77,14 @@ def run(robot, **settings):
 
 def test_an_episode_ends_when_the_task_is_solved():
     told = []
-    episode = run(Rail(), on_turn=told.append)
+    episode = run(Rail(), on_step=told.append)
     # 50 mm in steps of 10 mm; within 5.9 mm after the fifth.
-    assert (episode.reason, len(episode.turns)) == ("solved", 5)
-    assert told == episode.turns
+    assert (episode.reason, len(episode.steps)) == ("solved", 5)
+    assert told == episode.steps
     np.testing.assert_allclose(
         distances(TASK, episode), [0.05, 0.04, 0.03, 0.02, 0.01, 0.0], atol=1e-6
     )
-    assert all(turn.seconds >= 0 for turn in episode.turns)
+    assert all(step.seconds >= 0 for step in episode.steps)
 
 
 def test_a_reached_goal_needs_no_push():
@@ -92,18 +92,18 @@ def test_a_reached_goal_needs_no_push():
     robot.state = eqx.tree_at(
         lambda s: s.position, robot.state, robot.state.position.at[1].set(TASK.goal)
     )
-    assert run(robot).turns == []
+    assert run(robot).steps == []
 
 
 def test_an_episode_is_truncated_after_its_maximum_of_pushes():
     episode = run(Rail(step=0.001), pushes=7)
-    assert (episode.reason, len(episode.turns)) == ("out of pushes", 7)
+    assert (episode.reason, len(episode.steps)) == ("out of pushes", 7)
 
 
 def test_a_robot_in_trouble_ends_the_episode():
     episode = run(Rail(step=0.0, trouble="disk 1 did not move"))
     assert episode.reason == "disk 1 did not move, 3 times in a row"
-    assert len(episode.turns) == 3
+    assert len(episode.steps) == 3
 
 
 class Contrary(Rail):
@@ -119,7 +119,7 @@ def test_an_executed_push_that_differs_from_the_planned_push_is_trouble():
     assert episode.reason.startswith(
         "executed push differs from the planned push: its direction"
     )
-    assert len(episode.turns) == 3
+    assert len(episode.steps) == 3
 
 
 def test_a_recording_with_nan_is_trouble():
@@ -147,7 +147,7 @@ def test_an_observation_with_nan_ends_the_episode():
     robot = Rail(step=float("nan"))
     episode = run(robot)
     assert episode.reason == "planning failed: observation: position holds NaN"
-    assert len(episode.turns) == 1
+    assert len(episode.steps) == 1
 
 
 def test_a_model_without_finite_predictions_ends_the_episode():
@@ -156,7 +156,13 @@ def test_a_model_without_finite_predictions_ends_the_episode():
     episode = run_episode(Rail(), planner, MODEL, lost, scene())
     told = "planning failed: model: none of the 6 candidate pushes is"
     assert episode.reason.startswith(told)
-    assert episode.turns == []
+    assert episode.steps == []
+
+
+def test_an_impossible_scene_is_refused():
+    impossible = eqx.tree_at(lambda s: s.mass, scene(), -scene().mass)
+    with pytest.raises(BadScene, match="mass"):
+        run_episode(Rail(), Ahead(), MODEL, TASK, impossible)
 
 
 def test_an_interruption_keeps_the_finished_pushes():
@@ -164,4 +170,4 @@ def test_an_interruption_keeps_the_finished_pushes():
     with pytest.raises(KeyboardInterrupt):
         run(Rail(stops_after=2), episode=episode)
     assert episode.reason == "interrupted"
-    assert len(episode.turns) == 2
+    assert len(episode.steps) == 2

@@ -15,12 +15,12 @@ import pytest
 
 from models.samples import identified_folder
 from models.test_checkpoint import write_network
+from report import samples
 from sainet.control import trials
 from sainet.control.config import ControlConfig
-from sainet.control.measure import measure_trials
 from sainet.control.record import SUMMARY, episode_file
 from sainet.control.trial import make_trial
-from sainet.control.trials import prepare, run_trials
+from sainet.control.trials import measure_trials, prepare, run_trials
 from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
 from sainet.models.identity import ModelId
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
@@ -39,25 +39,26 @@ def done(tmp_path_factory):
 
 
 def without_times(record):
-    return {k: v for k, v in record.items() if k != "decision_s"}
+    return msgspec.structs.replace(record, decision_s=[])
 
 
 def test_an_episode_file_is_complete(done):
     out, records = done
-    assert [r["trial"] for r in records] == [0, 1]
+    assert [r.trial for r in records] == [0, 1]
     for index, record in enumerate(records):
-        assert json.loads(episode_file(out, index).read_text()) == record
-        assert record["reason"].startswith("out of pushes: the goal was 177 mm away")
-        assert len(record["turns"]) == record["pushes"] == 2
-        turn = record["turns"][0]
-        assert np.shape(turn["actual"]) == (25, 2, 3)
-        assert np.shape(turn["planned"])[1:] == (2, 3)
-        assert abs(turn["contact_angle_deg"]) <= 60
-        assert turn["looked_at"] >= 72
+        written = json.loads(episode_file(out, index).read_text())
+        assert written == msgspec.to_builtins(record)
+        assert record.reason.startswith("out of pushes: the goal was 177 mm away")
+        assert len(record.steps) == record.pushes == 2
+        step = record.steps[0]
+        assert np.shape(step.actual) == (25, 2, 3)
+        assert np.shape(step.planned)[1:] == (2, 3)
+        assert abs(step.contact_angle_deg) <= 60
+        assert step.looked_at >= 72
         # Toward the goal, and near the planned pose.
-        gap = np.subtract(turn["actual"][-1], turn["planned"][9])[:, :2]
+        gap = np.subtract(step.actual[-1], step.planned[9])[:, :2]
         assert np.abs(gap).max() < 8
-    assert records[0]["goal_mm"] != records[1]["goal_mm"]
+    assert records[0].goal_mm != records[1].goal_mm
 
 
 def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
@@ -101,9 +102,9 @@ def test_an_episode_with_nan_is_recorded(tmp_path, monkeypatch):
     monkeypatch.setattr(SimulatedRobot, "push", diverge)
     config = replace(CONFIG, trials=1)
     (told,) = run_trials(config, tmp_path / "out")
-    assert (told["solved"], told["final_mm"]) == (False, None)
-    assert "NaN" in told["reason"]
-    assert told["turns"][0]["actual"][0] == [[None] * 3] * 2
+    assert (told.solved, told.final_mm) == (False, None)
+    assert "NaN" in told.reason
+    assert told.steps[0].actual[0] == [[None] * 3] * 2
     found = summarise([told])
     assert (found["solved"], found["within_4_mm"]) == (0, 0.0)
     assert found["median_final_mm"] is None
@@ -153,7 +154,7 @@ from sainet.control import trials
 trials.run_episode = functools.partial(
     trials.run_episode,
     # Slow enough to be interrupted, however busy the machine is.
-    on_turn=lambda turn: (print("pushed", flush=True), time.sleep(0.5)),
+    on_step=lambda step: (print("pushed", flush=True), time.sleep(0.5)),
 )
 # A shell has its background jobs ignore the signal, and children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -180,7 +181,7 @@ def test_an_interrupted_process_keeps_its_pushes(
     assert left["pushes"] == len(left["turns"]) >= 3
     assert not episode_file(out, 0).exists()
     whole = run_trials(replace(CONFIG, trials=1, pushes=60), out)[0]
-    assert without_times(whole["turns"][0]) == without_times(left["turns"][0])
+    assert msgspec.to_builtins(whole.steps[0]) == left["turns"][0]
     assert not (out / "episodes/000.interrupted.json").exists()
 
 
@@ -225,7 +226,7 @@ def test_models_share_worlds_but_not_properties():
     one, same = (make_trial(replace(CONFIG, model=m), 3) for m in ("physics", "in"))
     np.testing.assert_array_equal(one.task.goal, same.task.goal)
     assert one.robot.scene.table_friction == same.robot.scene.table_friction
-    nominal = make_trial(replace(CONFIG, knows="nominal"), 3)
+    nominal = make_trial(replace(CONFIG, given_properties="assumed"), 3)
     np.testing.assert_allclose(nominal.scene.radius, [0.0525, 0.058])
     np.testing.assert_allclose(one.scene.radius, [0.054, 0.059])
     np.testing.assert_array_equal(one.robot.scene.radius, nominal.robot.scene.radius)
@@ -240,14 +241,13 @@ def test_the_stopping_tolerance_may_be_below_the_tolerance(tmp_path, monkeypatch
     aimed = []
     run = lambda robot, planner, dynamics, task, scene, **_: aimed.append(task)  # noqa: E731
     monkeypatch.setattr(trials, "run_episode", run)
-    for aim in (1.0, 0.8):
-        config = replace(CONFIG, trials=1, aim=aim)
-        (judged,) = run_trials(config, tmp_path / str(aim))
-        assert judged["tolerance_mm"] == pytest.approx(5.9)
-        assert aimed[-1].tolerance == pytest.approx(aim * 0.1)
-    # Trials from before this setting resume.
+    for stop in (1.0, 0.8):
+        config = replace(CONFIG, trials=1, stopping_tolerance=stop)
+        (judged,) = run_trials(config, tmp_path / str(stop))
+        assert judged.tolerance_mm == pytest.approx(5.9)
+        assert aimed[-1].tolerance == pytest.approx(stop * 0.1)
     told = [read_json(tmp_path / name / CONFIG_FILE) for name in ("1.0", "0.8")]
-    assert [one["aim"] for one in told] == [1.0, 0.8]
+    assert [one["stopping_tolerance"] for one in told] == [1.0, 0.8]
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,7 @@ def test_a_network_for_other_controls_is_refused(tmp_path):
     [
         *(("trials", 0), ("pushes", 0), ("disks", 1), ("seed", -1)),
         *(("tolerance", 0.0), ("tolerance", 1.5), ("alignment", -1.0)),
-        *(("deadline", 0.0), ("aim", 0.0), ("aim", 1.1)),
+        *(("deadline", 0.0), ("stopping_tolerance", 0.0), ("stopping_tolerance", 1.1)),
         *(("deadline", math.inf), ("alignment", math.inf), ("alignment", math.nan)),
     ],
 )
@@ -300,8 +300,10 @@ def paired_test(one, other, measure="solved"):
 
 
 def records_of(solved, pushes=20, final=3.0, reason="solved"):
-    same = {"pushes": pushes, "final_mm": final, "reason": reason}
-    return [{**same, "solved": s, "decision_s": [0.1, 0.3]} for s in solved]
+    usual = samples.record(final_mm=final, reason=reason, decision_s=[0.1, 0.3])
+    return [
+        msgspec.structs.replace(usual, pushes=pushes, solved=each) for each in solved
+    ]
 
 
 def test_success_has_wilsons_interval():

@@ -1,7 +1,9 @@
 """A push made up by hand: two disks that touch, models a little off; and an episode."""
 
+import msgspec
 import numpy as np
 
+from sainet.control.record import EpisodeRecord
 from sainet.evaluation.conditions import Condition, PublishedValues
 from sainet.evaluation.summary import Comparison, Estimate, Factor, Row, Summary
 from sainet.models.identity import identity_named
@@ -150,7 +152,12 @@ def result():
 
 
 def record(pushes=3, **changes):
-    """Return the record of an episode: straight ahead, 10 mm a push, three samples."""
+    """Return the record of an episode, as `record_json` has it."""
+    return msgspec.convert(record_json(pushes, **changes), EpisodeRecord)
+
+
+def record_json(pushes=3, **changes):
+    """Return an episode as JSON: straight ahead, 10 mm a push, three samples."""
     turns = [
         {
             "observed": [[10.0 * push, 0.0, 0.0], [10.0 * push + 113, 0.0, 0.0]],
@@ -190,7 +197,8 @@ def record(pushes=3, **changes):
 
 def lost_record():
     """Return the record of an episode whose last push left the finite numbers."""
-    lost = record(solved=False, reason="the simulated world left", final_mm=None)
+    lost = record_json(solved=False, reason="the simulated world left", final_mm=None)
     lost["turns"][-1]["actual"][1:] = [[[None] * 3] * 2] * 2
     lost["turns"][-1]["pusher"][1:] = [[None] * 2] * 2
-    return lost | {"final": [[None] * 3] * 2}
+    lost["final"] = [[None] * 3] * 2
+    return msgspec.convert(lost, EpisodeRecord)

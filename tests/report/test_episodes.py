@@ -4,6 +4,7 @@ import json
 from xml.etree import ElementTree
 
 import numpy as np
+from msgspec import structs
 
 from report.samples import lost_record, record
 from sainet.report.episode_frames import EpisodeFrames, episode_data, outcome
@@ -65,7 +66,7 @@ def test_the_outcome_uses_the_true_final_pose():
 
 
 def test_nan_and_infinity_are_not_drawn(tmp_path):
-    records = [lost_record(), lost_record() | {"turns": []}]
+    records = [lost_record(), structs.replace(lost_record(), steps=[])]
     text = draw_episodes(records, tmp_path / "a.svg").read_text()
     assert "nan" not in text.lower().replace("nance", "")
     for lost in records:

@@ -33,7 +33,9 @@ def test_errors_episodes_and_figures_come_together(tmp_path):
     write_json(tmp_path / "config.json", {"command": "control", "seed": 3})
     write_document(tmp_path / TABLE, Result(summary=samples.result()))
     for trial in range(8):
-        write_json(tmp_path / FOLDER / f"{trial:03d}.json", samples.record(trial=trial))
+        write_json(
+            tmp_path / FOLDER / f"{trial:03d}.json", samples.record_json(trial=trial)
+        )
     (tmp_path / FOLDER / "008.interrupted.json").write_text("cut sho")
     draw_paths(samples.replay(), tmp_path / "paths.svg")
     (tmp_path / "of-somebody.svg").write_text("<svg onload='alert(1)'/>")

@@ -22,7 +22,7 @@ def test_the_trials_include_those_of_the_paper():
     assert all(config.world == "bullet" for config in found.values())
     sizes = [config.trials for config in found.values()]
     assert sizes == [100] * 4 + [50] * 2
-    assert found["hard, tree, nominal properties"].knows == "nominal"
+    assert found["hard, tree, nominal properties"].given_properties == "assumed"
     assert found["easy, tree, three disks"].disks == 3
     assert len({tuple(vars(config).items()) for config in found.values()}) == 6
 

@@ -3,15 +3,19 @@
 import shlex
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_cache
-from sainet.cli.output import Output
+from sainet.cli.output import Json, Output
 from sainet.cli.progress import progress_bar
 from sainet.control.config import ControlConfig
 from sainet.runs.documents import read_json
 from sainet.runs.manifest import MANIFEST
 from sainet.runs.workers import worker_pool
+
+if TYPE_CHECKING:
+    from sainet.control.record import EpisodeRecord
+    from sainet.evaluation.trials import TrialRow
 
 _DRAWN = 6  # episodes
 
@@ -30,42 +34,39 @@ class Control:
     """Number of processes, which does not affect the result. Default: one per core."""
     output: Output = field(default_factory=Output)
 
-    def run(self) -> dict[str, Any]:
+    def run(self) -> Json:
         """Run the trials and say how they went."""
         use_cache()
-        from sainet.control.measure import measure_trials
-        from sainet.control.trials import prepare, run_trials
+        from sainet.control.trials import measure_trials, prepare, run_trials
         from sainet.evaluation.trials import trial_rows
-        from sainet.models.identity import identity_named
         from sainet.report.figures.episodes import draw_episodes
 
         config = self.config
-        prepare(config)
+        model, _ = prepare(config)
         solved = 0
         bar = progress_bar(f"Pushing ({config.model})", config.trials, self.output)
         with worker_pool(self.workers) as pool, bar as advance:
 
-            def on_episode(record: dict[str, Any]) -> None:
+            def on_episode(record: "EpisodeRecord") -> None:
                 nonlocal solved
-                solved += record["solved"]
+                solved += record.solved
                 advance(1, f"{solved} solved")
 
             records = run_trials(config, self.out, executor=pool, on_episode=on_episode)
         figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
         if self.animate:
             self._animate(records[:_DRAWN])
-        (row,) = trial_rows(measure_trials({identity_named(config.model): records}))
-        found = row.to_dict()
-        self.output.say(_outcome(config, found))
+        (row,) = trial_rows(measure_trials({model.id: records}))
+        self.output.say(_outcome(config, row))
         drawn = f"the first {_DRAWN}" if config.trials > _DRAWN else "each"
         self.output.say(f"Episodes are in {self.out}, {drawn} drawn in {figure}.")
         names = {
             name: getattr(config, name)
             for name in ("model", "goals", "planner", "world")
         }
-        return names | found | {"episodes": str(self.out / "episodes")}
+        return names | row.to_dict() | {"episodes": str(self.out / "episodes")}
 
-    def _animate(self, records: list[dict[str, Any]]) -> None:
+    def _animate(self, records: list["EpisodeRecord"]) -> None:
         from sainet.report.figures.video import best_format, frame_count, write_film
         from sainet.report.pages.page import Report, write_report
 
@@ -87,12 +88,12 @@ class Control:
         self.output.say(f"{film} shows the first episode; {page} plays {len(records)}.")
 
 
-def _outcome(config: ControlConfig, found: dict[str, Any]) -> str:
+def _outcome(config: ControlConfig, found: "TrialRow") -> str:
     """Say how many goals were reached, and how soon those that were."""
-    low, high = found["interval"]
-    pushes = found["median_pushes"]
+    low, high = found.interval
+    pushes = found.median_pushes
     return (
-        f"{config.model}: {found['solved']} of {found['trials']} {config.goals} goals "
+        f"{config.model}: {found.solved} of {found.trials} {config.goals} goals "
         f"solved (95 % interval {low:.0%} to {high:.0%})"
         + ("." if pushes is None else f", with a median of {pushes:g} pushes.")
     )

@@ -14,7 +14,7 @@ from sainet.scenes.quantities import (
 from sainet.worlds.noise import NoiseLevel
 
 Goals = Literal["easy", "hard"]
-Knowledge = Literal["true", "nominal"]
+GivenProperties = Literal["true", "assumed"]
 _COUNTS = {
     "trials": (1, 1_000_000),
     "pushes": (1, 1_000_000),
@@ -46,13 +46,13 @@ class ControlConfig:
     """Maximum pushes per episode."""
     disks: int = 2
     """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
-    knows: Knowledge = "true"
-    """Masses and radii given to the network: true, or nominal (the assumed
-    properties)."""
+    given_properties: GivenProperties = "true"
+    """Masses and radii given to the network: true, or assumed (those of the internal
+    engine)."""
     tolerance: float = 0.1
     """Success tolerance (fraction of target-disk radius)."""
-    aim: float = 0.9
-    """Stopping tolerance: measured distance that ends an episode (fraction of the
+    stopping_tolerance: float = 0.9
+    """Measured distance that ends an episode (fraction of the
     tolerance). The default leaves four standard deviations of measurement noise."""
     alignment: float = 3.0
     """Weight of the cosine distance in the heuristic (m)."""
@@ -67,12 +67,15 @@ class ControlConfig:
         for name, (low, high) in _COUNTS.items():
             require_count(name, getattr(self, name), low=low, high=high)
         require_one_of("goals", self.goals, get_args(Goals))
-        require_one_of("knows", self.knows, get_args(Knowledge))
+        require_one_of(
+            "given_properties", self.given_properties, get_args(GivenProperties)
+        )
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
         wanted = f"at least {_LEAST_TOLERANCE:g}, below 1"
         good = _LEAST_TOLERANCE <= self.tolerance < 1
         require(good, "tolerance", wanted, self.tolerance)
         ALIGNMENT.require("alignment", self.alignment)
-        require(0 < self.aim <= 1, "aim", "above 0, at most 1", self.aim)
+        stop = self.stopping_tolerance
+        require(0 < stop <= 1, "stopping_tolerance", "above 0, at most 1", stop)
         late = self.deadline is None or 0 < self.deadline < math.inf
         require(late, "deadline", "positive and finite", self.deadline)

@@ -13,7 +13,7 @@ from sainet.robots.base import AbstractRobot
 from sainet.runs.errors import BadScene, Diverged
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
-from sainet.scenes.scene import Scene
+from sainet.scenes.scene import Scene, check_scene
 from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
@@ -29,8 +29,8 @@ _TOLERANCES = (
 
 
 @dataclass(frozen=True)
-class Turn:
-    """A control step: one decision and its push."""
+class ControlStep:
+    """One decision and its push."""
 
     observed: State
     plan: Plan
@@ -42,7 +42,7 @@ class Turn:
 class Episode:
     """An episode: its control steps, the last observation and the reason of its end."""
 
-    turns: list[Turn] = field(default_factory=list)
+    steps: list[ControlStep] = field(default_factory=list)
     final: State | None = None  # last observation
     reason: str = "interrupted"  # why the episode ended
 
@@ -56,7 +56,7 @@ def run_episode(
     *,
     pushes: int = 60,
     episode: Episode | None = None,
-    on_turn: Callable[[Turn], None] = lambda turn: None,
+    on_step: Callable[[ControlStep], None] = lambda step: None,
 ) -> Episode:
     """Return an episode, which ends when the task is solved or no push is left.
 
@@ -68,18 +68,22 @@ def run_episode(
         scene: properties given to model and task.
         pushes: maximum number of pushes.
         episode: filled during the episode, so that an interruption keeps its steps.
-        on_turn: called after each push.
+        on_step: called after each push.
 
     Returns:
         The episode; its reason is `solved`, `out of pushes`, or the failure.
+
+    Raises:
+        BadScene: a property is out of its range.
     """
+    check_scene(scene)
     episode = episode or Episode()
     troubles = 0
     while True:
         episode.final = state = robot.observe()
         if bool(np.isfinite(state.position).all() and task.is_solved(scene, state)):
             return _end(episode, SOLVED)
-        if len(episode.turns) == pushes:
+        if len(episode.steps) == pushes:
             return _end(episode, _out_of_pushes(task, planner, episode, pushes))
         start = time.perf_counter()
         try:
@@ -88,12 +92,11 @@ def run_episode(
             return _end(episode, f"planning failed: {error}")
         seconds = time.perf_counter() - start
         recording = checked(robot.push(plan.pushes[0]), plan.pushes[0])
-        turn = Turn(state, plan, recording, seconds)
-        episode.turns.append(turn)
-        on_turn(turn)
-        troubles = troubles + 1 if turn.recording.trouble else 0
+        episode.steps.append(ControlStep(state, plan, recording, seconds))
+        on_step(episode.steps[-1])
+        troubles = troubles + 1 if recording.trouble else 0
         if troubles == _MOST_TROUBLES:
-            return _end(episode, f"{turn.recording.trouble}, {troubles} times in a row")
+            return _end(episode, f"{recording.trouble}, {troubles} times in a row")
 
 
 def checked(recording: Recording, planned: Push) -> Recording:
@@ -122,7 +125,7 @@ def _out_of_pushes(
 ) -> str:
     """Return the reason of a truncated episode, and whether the goal was in reach."""
     reach = pushes * planner.actions.length
-    away = float(task.distance(episode.turns[0].observed))
+    away = float(task.distance(episode.steps[0].observed))
     if reach >= away:
         return "out of pushes"
     return (
@@ -140,6 +143,6 @@ def distances(
     task: AbstractTask, episode: Episode
 ) -> Float[np.ndarray, " observation"]:
     """Return the remaining distances before each push and at the end (m)."""
-    states = [turn.observed for turn in episode.turns]
+    states = [step.observed for step in episode.steps]
     states += [episode.final] if episode.final is not None else []
     return np.array([float(task.distance(state)) for state in states])

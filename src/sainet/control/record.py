@@ -2,13 +2,13 @@
 
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 import numpy as np
 
 from sainet.control.config import ControlConfig
-from sainet.control.episode import Episode, Turn
+from sainet.control.episode import ControlStep, Episode
 from sainet.control.trial import Trial
 from sainet.runs.documents import read_document
 from sainet.runs.errors import BadInput, shown
@@ -37,8 +37,8 @@ _RadiusMm = Annotated[float, RADIUS.times(1000, "mm").meta]
 _PusherRadiusMm = Annotated[float, PUSHER_RADIUS.times(1000, "mm").meta]
 
 
-class TurnRecord(msgspec.Struct, kw_only=True):
-    """One decision and its push."""
+class StepRecord(msgspec.Struct, kw_only=True):
+    """One control step: a decision and its push."""
 
     contact_angle_deg: _Place = None
     direction_deg: _Place = None
@@ -77,7 +77,7 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
     pusher_radius_mm: _PusherRadiusMm
     tolerance_mm: _Positive
     table_friction: Friction
-    turns: list[TurnRecord]
+    steps: list[StepRecord] = msgspec.field(name="turns")
 
     def __post_init__(self) -> None:
         """Check lengths that depend on each other."""
@@ -86,11 +86,11 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
             raise ValueError(f"moved is {self.moved} of {disks} disks")
         if len(self.final) != disks:
             raise ValueError(f"final has {len(self.final)} of {disks} disks")
-        for index, turn in enumerate(self.turns):
-            paths = [turn.observed, *turn.planned, *turn.actual]
+        for index, step in enumerate(self.steps):
+            paths = [step.observed, *step.planned, *step.actual]
             if {len(poses) for poses in paths} != {disks}:
                 raise ValueError(f"turns[{index}] does not have {disks} disks")
-            if len(turn.pusher) != len(turn.actual):
+            if len(step.pusher) != len(step.actual):
                 raise ValueError(f"turns[{index}]: pusher and actual differ in length")
 
 
@@ -102,36 +102,34 @@ class Finished(msgspec.Struct):
 
 def record(
     config: ControlConfig, index: int, trial: Trial, episode: Episode
-) -> dict[str, Any]:
+) -> EpisodeRecord:
     """Return the record of an episode; lengths in mm, angles in degrees.
 
     `solved` uses the true pose, not the measured pose, which is noisy. NaN and infinity
     become None.
     """
     task, robot = trial.task, trial.robot
-    final = 1000 * float(task.distance(robot.truth))
-    told = {
-        "trial": index,
-        "model": config.model,
-        "goals": config.goals,
-        "reason": episode.reason,
-        "solved": bool(task.is_solved(robot.scene, robot.truth)),
-        "final_mm": final,
-        "pushes": len(episode.turns),
-        "final": _poses(poses_of(robot.truth)),
-        "decision_s": [turn.seconds for turn in episode.turns],
-        "goal_mm": _mm(task.goal),
-        "moved": task.moved,
-        "radius_mm": _mm(robot.scene.radius),
-        "pusher_radius_mm": 1000 * float(robot.scene.pusher_radius),
-        "tolerance_mm": 1000 * task.tolerance * float(robot.scene.radius[task.moved]),
-        "table_friction": float(robot.scene.table_friction),
-        "turns": [_turn(trial, turn) for turn in episode.turns],
-    }
-    return _finite_or_none(told)
+    return EpisodeRecord(
+        trial=index,
+        model=config.model,
+        goals=config.goals,
+        reason=episode.reason,
+        solved=bool(task.is_solved(robot.scene, robot.truth)),
+        final_mm=_known(1000 * float(task.distance(robot.truth))),
+        pushes=len(episode.steps),
+        final=_poses(poses_of(robot.truth)),
+        decision_s=[step.seconds for step in episode.steps],
+        goal_mm=_mm(task.goal),
+        moved=task.moved,
+        radius_mm=_mm(robot.scene.radius),
+        pusher_radius_mm=1000 * float(robot.scene.pusher_radius),
+        tolerance_mm=1000 * task.tolerance * float(robot.scene.radius[task.moved]),
+        table_friction=float(robot.scene.table_friction),
+        steps=[_step(trial, step) for step in episode.steps],
+    )
 
 
-def read_record(path: Path) -> dict[str, Any]:
+def read_record(path: Path) -> EpisodeRecord:
     """Read the record of an episode, checked against `EpisodeRecord`.
 
     Raises:
@@ -143,7 +141,7 @@ def read_record(path: Path) -> dict[str, Any]:
         raise BadInput(
             f"{path}: trial is {found.trial}, which is another episode; {remedy}."
         )
-    return msgspec.to_builtins(found)
+    return found
 
 
 def episode_file(out: Path, trial: int) -> Path:
@@ -169,26 +167,26 @@ def episode_files(out: Path) -> list[Path]:
     return files
 
 
-def _turn(trial: Trial, turn: Turn) -> dict[str, Any]:
-    recording, plan = turn.recording, turn.plan
+def _step(trial: Trial, step: ControlStep) -> StepRecord:
+    recording, plan = step.recording, step.plan
     push = recording.commanded or plan.pushes[0]
-    return {
-        "contact_angle_deg": _degrees(push.contact_angle),
-        "direction_deg": _degrees(push.direction),
-        "length_mm": 1000 * float(push.length),
-        "speed_mm_s": 1000 * float(push.speed),
-        "observed": _poses(poses_of(turn.observed)),
-        "distance_mm": 1000 * float(trial.task.distance(turn.observed)),
-        "planned_pushes": len(plan.pushes),
-        "planned": _poses(plan.path[_EVERY - 1 :: _EVERY]),
-        "planned_distance_mm": 1000 * plan.distance,
-        "looked_at": plan.looked_at,
-        "is_complete": plan.is_complete,
-        "warnings": list(plan.warnings),
-        "actual": _poses(recording.pose[_EVERY::_EVERY]),
-        "pusher": _mm(recording.pusher[_EVERY::_EVERY]),
-        "trouble": recording.trouble or None,
-    }
+    return StepRecord(
+        contact_angle_deg=_degrees(push.contact_angle),
+        direction_deg=_degrees(push.direction),
+        length_mm=_known(1000 * float(push.length)),
+        speed_mm_s=_known(1000 * float(push.speed)),
+        observed=_poses(poses_of(step.observed)),
+        distance_mm=_known(1000 * float(trial.task.distance(step.observed))),
+        planned_pushes=len(plan.pushes),
+        planned=_poses(plan.path[_EVERY - 1 :: _EVERY]),
+        planned_distance_mm=_known(1000 * plan.distance),
+        looked_at=plan.looked_at,
+        is_complete=plan.is_complete,
+        warnings=list(plan.warnings),
+        actual=_poses(recording.pose[_EVERY::_EVERY]),
+        pusher=_mm(recording.pusher[_EVERY::_EVERY]),
+        trouble=recording.trouble or None,
+    )
 
 
 def poses_of(state: State) -> np.ndarray:
@@ -198,25 +196,27 @@ def poses_of(state: State) -> np.ndarray:
     )
 
 
-def _finite_or_none(value: Any) -> Any:  # noqa: ANN401
-    """Return JSON values with null for NaN and infinity."""
-    if isinstance(value, dict):
-        return {name: _finite_or_none(each) for name, each in value.items()}
-    if isinstance(value, list):
-        return [_finite_or_none(each) for each in value]
-    is_lost = isinstance(value, float) and not math.isfinite(value)
-    return None if is_lost else value
+def _known(value: float) -> float | None:
+    """Return a number, None for NaN and infinity."""
+    return value if math.isfinite(value) else None
 
 
 def _poses(pose: np.ndarray) -> list:
     """Return x and y in mm and the angle in degrees, rounded to 0.01."""
-    units = np.array([1000, 1000, np.rad2deg(1)])
-    return np.round(np.asarray(pose, np.float64) * units, 2).tolist()
+    return _rounded(pose, np.array([1000, 1000, np.rad2deg(1)]))
 
 
 def _mm(metres: object) -> list:
-    return np.round(1000 * np.asarray(metres, np.float64), 2).tolist()
+    return _rounded(metres, 1000)
 
 
-def _degrees(radians: object) -> float:
-    return float(np.rad2deg(np.asarray(radians, np.float64)))
+def _rounded(values: object, unit: np.ndarray | int) -> list:
+    """Return numbers rounded to 0.01 of a unit, None for NaN and infinity."""
+    found = np.round(np.asarray(values, np.float64) * unit, 2)
+    numbers = found.astype(object)
+    numbers[~np.isfinite(found)] = None
+    return numbers.tolist()
+
+
+def _degrees(radians: object) -> float | None:
+    return _known(float(np.rad2deg(np.asarray(radians, np.float64))))

@@ -10,11 +10,11 @@ from sainet.engines import make_engine
 from sainet.engines.simulator import PAPER
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, at_rest
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
 from sainet.worlds.config import WorldConfig, bounds
 from sainet.worlds.noise import NoiseConfig, at_level
+from sainet.worlds.sampling import in_a_row
 from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
 
@@ -37,7 +37,7 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
     rng = np.random.default_rng([_WORLD, config.seed, index])
     friction = float(rng.uniform(*bounds(WorldConfig.table_friction)))
     true = _scene(MASS, RADIUS, config.disks, friction)
-    state = _in_a_row(np.asarray(true.radius))
+    state = in_a_row(np.asarray(true.radius))
     noise = at_level(NoiseConfig(), config.noise_level)
     world = SimulatedWorld(
         make_engine(config.world), RobotSetup(), noise, rng, np.float32
@@ -57,7 +57,7 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
     )
     mass, radius, friction = PAPER.mass, PAPER.radius, PAPER.table_friction
     assert mass and radius and friction  # all are assumed
-    given = (mass, radius) if config.knows == "nominal" else (MASS, RADIUS)
+    given = (mass, radius) if config.given_properties == "assumed" else (MASS, RADIUS)
     return Trial(robot, task, _scene(*given, config.disks, friction))
 
 
@@ -71,11 +71,3 @@ def _scene(
         return (*values, *[mean] * disks)[:disks]
 
     return Scene.disks(each(mass), each(radius), table_friction=friction)
-
-
-def _in_a_row(radius: np.ndarray) -> State:
-    """Return disks that touch, along the x axis, the first one at the origin."""
-    x = np.concatenate([[0.0], np.cumsum(radius[:-1] + radius[1:])])
-    position = jnp.asarray(np.stack([x, 0 * x], axis=-1), jnp.float32)
-    behind = jnp.array([-2 * radius[0], 0], jnp.float32)
-    return at_rest(position, jnp.zeros(len(radius)), behind)

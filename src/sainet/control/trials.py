@@ -1,17 +1,19 @@
 """Many episodes, each with its own goal, table and noise: seeded and resumable."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import jax
+import numpy as np
+import xarray as xr
 
 from sainet.control.config import ControlConfig
-from sainet.control.episode import Episode, run_episode
+from sainet.control.episode import SOLVED, Episode, run_episode
 from sainet.control.record import (
     SUMMARY,
+    EpisodeRecord,
     Finished,
     episode_file,
     read_record,
@@ -19,15 +21,16 @@ from sainet.control.record import (
 )
 from sainet.control.trial import make_trial
 from sainet.engines import make_engine
+from sainet.evaluation.conditions import Condition, Header
+from sainet.evaluation.measurements import Measurements
+from sainet.models.identity import ModelId
 from sainet.models.library import Model, load_model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
-from sainet.runs.documents import write_document, write_json
+from sainet.runs.documents import write_document
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
 from sainet.scenes.scene import TIME_STEP
-
-Told = Callable[[dict[str, Any]], None]
 
 
 def run_trials(
@@ -35,8 +38,8 @@ def run_trials(
     out: Path,
     *,
     executor: Executor | None = None,
-    on_episode: Told = lambda episode: None,
-) -> list[dict[str, Any]]:
+    on_episode: Callable[[EpisodeRecord], None] = lambda episode: None,
+) -> list[EpisodeRecord]:
     """Return the records of all trials; only missing episodes are run.
 
     Args:
@@ -72,23 +75,23 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
     """
     model, planner = prepare(config)
     trial, episode = make_trial(config, index), Episode()
-    aim = replace(trial.task, tolerance=config.aim * config.tolerance)
+    task = replace(trial.task, tolerance=config.stopping_tolerance * config.tolerance)
     path = episode_file(out, index)
     try:
         run_episode(
             trial.robot,
             planner,
             model.dynamics,
-            aim,
+            task,
             trial.scene,
             pushes=config.pushes,
             episode=episode,
         )
     except KeyboardInterrupt:
         left = path.with_suffix(".interrupted.json")
-        write_json(left, record(config, index, trial, episode))
+        write_document(left, record(config, index, trial, episode))
         raise
-    write_json(path, record(config, index, trial, episode))
+    write_document(path, record(config, index, trial, episode))
     path.with_suffix(".interrupted.json").unlink(missing_ok=True)
     return index
 
@@ -104,3 +107,43 @@ def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     planner = make_planner(config.planner, deadline=config.deadline)
     make_engine(config.world)
     return model, planner
+
+
+def measure_trials(
+    records: Mapping[ModelId, Sequence[EpisodeRecord]],
+    condition: Condition | None = None,
+) -> Measurements:
+    """Return the measurements of trials.
+
+    Args:
+        records: of each model, the same goals in the same order.
+        condition: that all trials belong to.
+    """
+    found = list(records.values())
+    count = len(found[0])
+    longest = max(len(each.decision_s) for part in found for each in part)
+    seconds = np.full((len(found), count, longest), np.nan)
+    for model, part in enumerate(found):
+        for trial, each in enumerate(part):
+            seconds[model, trial, : len(each.decision_s)] = each.decision_s
+    columns = {
+        "solved": [[float(each.solved) for each in part] for part in found],
+        # The measured pose may lie within the tolerance while the true one does not.
+        "ended": [[float(each.reason == SOLVED) for each in p] for p in found],
+        "pushes": [[float(each.pushes) for each in part] for part in found],
+        # An episode that diverged ended infinitely far from its goal.
+        "final_mm": [
+            [np.inf if e.final_mm is None else e.final_mm for e in part]
+            for part in found
+        ],
+    }
+    numbers = np.arange(count, dtype=np.int32)
+    places = {"condition": 0 * numbers, "fold": 0 * numbers - 1, "row": numbers}
+    data = xr.Dataset(
+        {name: (("model", "sample"), values) for name, values in columns.items()}
+        | {"decision_s": (("model", "sample", "decision"), seconds)},
+        {name: ("sample", values) for name, values in places.items()},
+    )
+    return Measurements(
+        data, Header(models=tuple(records), conditions=(condition or Condition(),))
+    )

@@ -1,59 +1,57 @@
 """Frames of an episode, for the page and the animation."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
+from sainet.control.record import EpisodeRecord, StepRecord
 from sainet.report.palette import style_of
 
 FRAMES_PER_SECOND = 30  # records hold every eighth step of 1/240 s
 _FRAMES_OF_PUSH = 12  # 0.4 s: the push lasts 0.2 s, then all bodies come to rest
 _STRIDE = 3  # between the drawn points of a planned path
 
-Record = Mapping[str, Any]
-
 
 @dataclass(frozen=True)
 class EpisodeFrames:
     """Frames of an episode, 30 per second, without the decision times."""
 
-    record: Record
+    record: EpisodeRecord
 
     @cached_property
     def starts(self) -> list[int]:
         """The frame at which each push starts."""
-        lengths = [1 + len(self._shown(turn["actual"])) for turn in self._turns]
+        lengths = [1 + len(self._shown(step.actual)) for step in self._steps]
         return [0, *np.cumsum(lengths).tolist()][: len(lengths)]
 
     @cached_property
     def poses(self) -> Float[np.ndarray, "frame body 3"]:
         """The pose of each disk (mm, mm, degrees)."""
-        if not self._turns:
-            return np.asarray([self.record["final"]], float)
+        if not self._steps:
+            return np.asarray([self.record.final], float)
         parts = [
             part
-            for turn in self._turns
-            for part in ([turn["observed"]], self._shown(turn["actual"]))
+            for step in self._steps
+            for part in ([step.observed], self._shown(step.actual))
         ]
         return np.concatenate([np.asarray(part, float) for part in parts])
 
     @cached_property
     def pusher(self) -> Float[np.ndarray, "frame 2"]:
         """The centre of the pusher (mm); NaN before the first push."""
-        if not self._turns:
+        if not self._steps:
             return np.full((1, 2), np.nan)
-        parts = [self._shown(turn["pusher"]) for turn in self._turns]
+        parts = [self._shown(step.pusher) for step in self._steps]
         # While the disks are observed, the pusher is at the start of its push.
         return np.concatenate([np.asarray([part[0], *part], float) for part in parts])
 
     @property
     def plans(self) -> list[Float[np.ndarray, "point body 2"]]:
         """The planned path of the disks' centres at each decision (mm)."""
-        paths = [np.asarray(turn["planned"], float) for turn in self._turns]
+        paths = [np.asarray(step.planned, float) for step in self._steps]
         return [
             np.concatenate([path[::_STRIDE, :, :2], path[-1:, :, :2]]) for path in paths
         ]
@@ -61,39 +59,39 @@ class EpisodeFrames:
     @property
     def distances(self) -> list[float]:
         """The distance from the goal before each push, and at the end (mm)."""
-        measured = [turn["distance_mm"] for turn in self._turns]
-        return np.asarray([*measured, self.record["final_mm"]], float).tolist()
+        measured = [step.distance_mm for step in self._steps]
+        return np.asarray([*measured, self.record.final_mm], float).tolist()
 
     def turn_at(self, frame: int) -> int:
         """Return the index of the current push; -1 before the first."""
         return int(np.searchsorted(self.starts, frame, side="right")) - 1
 
     @property
-    def _turns(self) -> list[dict[str, Any]]:
-        return self.record["turns"]
+    def _steps(self) -> list[StepRecord]:
+        return self.record.steps
 
     @staticmethod
     def _shown(path: list) -> list:
         return path[:_FRAMES_OF_PUSH]
 
 
-def episode_title(record: Record) -> str:
+def episode_title(record: EpisodeRecord) -> str:
     """Return the title of an episode: its model and outcome."""
-    model = style_of(record["model"]).label
-    return f"{model}, {record['goals']} goal {record['trial'] + 1}: {outcome(record)}"
+    model = style_of(record.model).label
+    return f"{model}, {record.goals} goal {record.trial + 1}: {outcome(record)}"
 
 
-def outcome(record: Record) -> str:
+def outcome(record: EpisodeRecord) -> str:
     """Return how an episode ended."""
-    pushes = "1 push" if record["pushes"] == 1 else f"{record['pushes']} pushes"
-    if record["solved"]:
+    pushes = "1 push" if record.pushes == 1 else f"{record.pushes} pushes"
+    if record.solved:
         return f"solved with {pushes}"
     # Leave out the details after the colon, which the record keeps.
-    reason = record["reason"].partition(":")[0]
+    reason = record.reason.partition(":")[0]
     return f"{'not at the goal' if reason == 'solved' else reason} after {pushes}"
 
 
-def episode_data(record: Record) -> dict[str, Any]:
+def episode_data(record: EpisodeRecord) -> dict[str, object]:
     """Return an episode as JSON values for the script of the page (mm, rad, s)."""
     frames = EpisodeFrames(record)
     return {
@@ -101,11 +99,11 @@ def episode_data(record: Record) -> dict[str, Any]:
         "said": outcome(record),
         "timeStep": 1 / FRAMES_PER_SECOND,
         "steps": len(frames.poses) - 1,
-        "radius": record["radius_mm"],
-        "pusherRadius": record["pusher_radius_mm"],
-        "goal": dict(zip("xy", record["goal_mm"], strict=True)),
-        "tolerance": record["tolerance_mm"],
-        "moved": record["moved"],
+        "radius": record.radius_mm,
+        "pusherRadius": record.pusher_radius_mm,
+        "goal": dict(zip("xy", record.goal_mm, strict=True)),
+        "tolerance": record.tolerance_mm,
+        "moved": record.moved,
         "bodies": [
             _plane(frames.poses[:, body])
             | {"angle": _numbers(np.deg2rad(frames.poses[:, body, 2]).round(5))}

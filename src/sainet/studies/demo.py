@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
 
 from sainet.control.config import ControlConfig, Goals
+from sainet.control.record import EpisodeRecord
 from sainet.control.trials import run_trials
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
@@ -87,7 +87,7 @@ def run_demo(
     return DemoResult(write_report(report, folder.path / REPORT), summary)
 
 
-def push_to_goal(runner: Runner, goals: Goals, config: DemoConfig) -> dict[str, Any]:
+def push_to_goal(runner: Runner, goals: Goals, config: DemoConfig) -> EpisodeRecord:
     """Return the episode of one goal, pushed to with the SAIN that ships.
 
     A network of 300 iterations overshoots the goal, and no push from behind returns
@@ -96,7 +96,7 @@ def push_to_goal(runner: Runner, goals: Goals, config: DemoConfig) -> dict[str, 
     settings = ControlConfig(model="sain", goals=goals, trials=1, seed=config.seed)
     with runner.bar(f"Pushing ({goals})", 1) as bar:
 
-        def on_episode(record: dict[str, Any]) -> None:
+        def on_episode(record: EpisodeRecord) -> None:
             bar.add(1, outcome(record))
 
         return run_trials(settings, runner.out / goals, on_episode=on_episode)[0]

@@ -26,7 +26,7 @@ MODELS = (
 )
 GOALS = ("easy", "hard")
 PLANNERS = ("greedy", "tree")
-_FACTORS = ("world", "goals", "planner", "knows", "disks")
+_FACTORS = ("world", "goals", "planner", "given_properties", "disks")
 
 
 def _plan(scope: Scope) -> Plan:
@@ -46,7 +46,7 @@ def trials(count: int) -> Iterator[RunTrials]:
             config = replace(usual, planner=planner, goals=goals)
             yield _trials(f"{goals}, {planner}", config)
     few = replace(usual, planner="tree", trials=max(count // 2, 1))
-    nominal = replace(few, goals="hard", knows="nominal")
+    nominal = replace(few, goals="hard", given_properties="assumed")
     yield _trials("hard, tree, nominal properties", nominal)
     yield _trials("easy, tree, three disks", replace(few, goals="easy", disks=3))
 

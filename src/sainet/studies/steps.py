@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from msgspec import structs
 
 from sainet.control.config import ControlConfig
-from sainet.control.measure import measure_trials
-from sainet.control.trials import run_trials
+from sainet.control.record import EpisodeRecord
+from sainet.control.trials import measure_trials, run_trials
 from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
@@ -30,7 +30,7 @@ from sainet.models.library import Model, load_model
 from sainet.runs.documents import content_hash
 
 if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
+    from sainet.studies.runner import Bar, Runner
 
 T = TypeVar("T")
 _DIGEST = 10  # characters of a hash in the name of a folder
@@ -303,23 +303,19 @@ class RunTrials(Step[Measurements]):
             config = replace(self.config, model=model.slug)
             title = f"Pushing ({model.slug}, {self.name})"
             with runner.bar(title, config.trials) as bar:
-                solved = Counter[bool]()
-
-                def on_episode(
-                    record: dict[str, Any],
-                    bar: Any = bar,  # noqa: ANN401
-                    solved: Counter[bool] = solved,
-                ) -> None:
-                    solved[record["solved"]] += 1
-                    bar.add(1, f"{solved[True]} solved")
-
+                solved: list[bool] = []
                 records[model] = run_trials(
                     config,
                     runner.folder(self) / model.slug,
                     executor=runner.executor,
-                    on_episode=on_episode,
+                    on_episode=partial(_count, bar, solved),
                 )
         return measure_trials(records, self.condition)
+
+
+def _count(bar: "Bar", solved: list[bool], record: EpisodeRecord) -> None:
+    solved.append(record.solved)
+    bar.add(1, f"{sum(solved)} solved")
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,3 +186,12 @@ def _is_free(
     return all(
         np.hypot(*(place - placed[i])) >= radius + radii[i] + 1e-6 for i in others
     )
+
+
+def in_a_row(radius: Float[np.ndarray, " body"]) -> State:
+    """Return disks at rest that touch, along the x axis, disk 1 at the origin."""
+    x = np.concatenate([[0.0], np.cumsum(radius[:-1] + radius[1:])])
+    behind = jnp.array([-2 * radius[0], 0], jnp.float32)
+    return at_rest(
+        _single(np.stack([x, 0 * x], axis=-1)), jnp.zeros(len(radius)), behind
+    )

@@ -2,7 +2,7 @@
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
+from sainet.control.record import EpisodeRecord
 from sainet.report.episode_frames import outcome
 from sainet.report.figures.canvas import house_look, new_figure, save
 from sainet.report.palette import INK, MOVED, OTHER, PUSHED, TARGET
@@ -18,11 +19,10 @@ _ACROSS = 3  # panels
 _TITLE_WIDTH = 26  # characters; a longer title would leave the figure
 _MARGIN = 10  # mm around the drawing
 
-Record = Mapping[str, Any]
 Place = Sequence[float] | np.ndarray  # mm
 
 
-def draw_episodes(records: Sequence[Record], path: Path) -> Path:
+def draw_episodes(records: Sequence[EpisodeRecord], path: Path) -> Path:
     """Draw one panel per episode: initial disks transparent, final disks solid.
 
     The target region is the tolerance around the goal; a white cross marks the final
@@ -47,50 +47,50 @@ def draw_episodes(records: Sequence[Record], path: Path) -> Path:
         return save(figure, path)
 
 
-def _extent(records: Sequence[Record]) -> tuple[np.ndarray, np.ndarray]:
+def _extent(records: Sequence[EpisodeRecord]) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower left and upper right corners of the drawing (mm)."""
     places = [body_paths(record)[..., :2].reshape(-1, 2) for record in records]
-    goals = np.array([record["goal_mm"] for record in records])
+    goals = np.array([record.goal_mm for record in records])
     every = np.concatenate([*places, goals])
-    reach = _MARGIN + max(max(record["radius_mm"]) for record in records)
+    reach = _MARGIN + max(max(record.radius_mm) for record in records)
     # Diverged poses have no position.
     return np.nanmin(every, axis=0) - reach, np.nanmax(every, axis=0) + reach
 
 
-def draw_episode(axes: Axes, record: Record) -> None:
+def draw_episode(axes: Axes, record: EpisodeRecord) -> None:
     """Draw one episode (mm)."""
     path = body_paths(record)
-    for body, radius in enumerate(record["radius_mm"]):
+    for body, radius in enumerate(record.radius_mm):
         color = body_color(record, body)
         centres = path[:, body, :2]
         _disk(axes, centres[0], radius, facecolor=(color, 0.15), edgecolor=(color, 0.5))
         _disk(axes, centres[-1], radius, facecolor=(color, 0.85), edgecolor=color)
         axes.plot(*centres.T, color=color, linewidth=1.0)
-    _disk(axes, record["goal_mm"], record["tolerance_mm"], facecolor=TARGET, zorder=4)
-    end = path[-1, record["moved"], :2]
+    _disk(axes, record.goal_mm, record.tolerance_mm, facecolor=TARGET, zorder=4)
+    end = path[-1, record.moved, :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
     title = textwrap.fill(outcome(record), _TITLE_WIDTH)
-    off = record["final_mm"]
+    off = record.final_mm
     axes.set_title(title if off is None else f"{title}\n{off:.1f} mm off")
     axes.set_aspect("equal")
     axes.set(xlabel="x (mm)", ylabel="y (mm)")
 
 
-def body_paths(record: Record) -> np.ndarray:
+def body_paths(record: EpisodeRecord) -> np.ndarray:
     """Return the poses of all disks over an episode, ``[time, body, 3]`` (mm, deg).
 
     Diverged poses are NaN.
     """
-    turns = record["turns"]
-    if not turns:
-        return np.asarray([record["final"]], float)
-    parts = [[turns[0]["observed"]], *(turn["actual"] for turn in turns)]
+    steps = record.steps
+    if not steps:
+        return np.asarray([record.final], float)
+    parts = [[steps[0].observed], *(step.actual for step in steps)]
     return np.concatenate([np.asarray(part, float) for part in parts])
 
 
-def body_color(record: Record, body: int) -> str:
+def body_color(record: EpisodeRecord, body: int) -> str:
     """Return the colour of a disk: pushed disk red, target disk blue."""
-    if body == record["moved"]:
+    if body == record.moved:
         return MOVED
     return PUSHED if body == 0 else OTHER
 

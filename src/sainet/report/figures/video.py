@@ -12,10 +12,10 @@ from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Circle
 
+from sainet.control.record import EpisodeRecord
 from sainet.report.episode_frames import (
     FRAMES_PER_SECOND,
     EpisodeFrames,
-    Record,
     episode_title,
 )
 from sainet.report.figures.canvas import add_grid, house_look, new_figure
@@ -45,13 +45,13 @@ def best_format() -> str:
     return ".mp4"
 
 
-def frame_count(record: Record) -> int:
+def frame_count(record: EpisodeRecord) -> int:
     """Return the number of frames in the animation of an episode."""
     return len(EpisodeFrames(record).poses) + _HOLD
 
 
 def write_film(
-    record: Record, path: Path, *, on_frame: Callable[[], None] = lambda: None
+    record: EpisodeRecord, path: Path, *, on_frame: Callable[[], None] = lambda: None
 ) -> Path:
     """Write the animation of an episode atomically and return its path.
 
@@ -78,7 +78,7 @@ def _telling(frames: Iterator[Frame], on_frame: Callable[[], None]) -> Iterator[
         on_frame()
 
 
-def draw_frames(record: Record) -> Iterator[Frame]:
+def draw_frames(record: EpisodeRecord) -> Iterator[Frame]:
     """Yield the frames of an animation, 30 per second."""
     with house_look():
         stage = _Stage(record)
@@ -90,7 +90,7 @@ def draw_frames(record: Record) -> Iterator[Frame]:
 class _Stage:
     """Figure whose disks, plans and curve change from frame to frame."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: EpisodeRecord) -> None:
         self.record, self.frames = record, EpisodeFrames(record)
         figure = new_figure(*(pixels / _DOTS_PER_INCH for pixels in _PIXELS))
         figure.set_dpi(_DOTS_PER_INCH)
@@ -116,10 +116,10 @@ class _Stage:
 
     def _draw_scene(self) -> list:
         record, scene = self.record, self._scene
-        goal = (*record["goal_mm"],)
-        scene.add_patch(Circle(goal, record["tolerance_mm"], color=TARGET, zorder=4))
+        goal = record.goal_mm[0], record.goal_mm[1]
+        scene.add_patch(Circle(goal, record.tolerance_mm, color=TARGET, zorder=4))
         start, disks = self.frames.poses[0], []
-        for body, radius in enumerate(record["radius_mm"]):
+        for body, radius in enumerate(record.radius_mm):
             color, place = body_color(record, body), start[body, :2]
             ghost = Circle(place, radius, fill=False, ec=(color, 0.4), ls="--")
             disk = Circle(place, radius, fc=(color, 0.3), ec=color, lw=1.5)
@@ -128,10 +128,10 @@ class _Stage:
             (mark,) = scene.plot([], [], color=color, lw=1.5)
             (trail,) = scene.plot([], [], color=color, lw=1.2)
             disks.append((disk, mark, trail))
-        self._pusher = Circle((0, 0), record["pusher_radius_mm"], color=INK, zorder=5)
+        self._pusher = Circle((0, 0), record.pusher_radius_mm, color=INK, zorder=5)
         scene.add_patch(self._pusher)
         places = self.frames.poses[..., :2].reshape(-1, 2)
-        reach = max(record["radius_mm"]) + 12
+        reach = max(record.radius_mm) + 12
         low = np.fmin(np.fmin.reduce(places), goal) - reach  # what diverged is NaN
         high = np.fmax(np.fmax.reduce(places), goal) + reach
         scene.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
@@ -140,12 +140,12 @@ class _Stage:
 
     def _draw_chart(self):  # noqa: ANN202
         chart, distances = self._chart, self.frames.distances
-        chart.axhspan(0, self.record["tolerance_mm"], color=TARGET, alpha=0.5, lw=0)
-        color = body_color(self.record, self.record["moved"])
+        chart.axhspan(0, self.record.tolerance_mm, color=TARGET, alpha=0.5, lw=0)
+        color = body_color(self.record, self.record.moved)
         # Its last point lies on the edge; that is no reason to make the chart smaller.
         look = {"color": color, "markersize": 3, "clip_on": False, "in_layout": False}
         (curve,) = chart.plot([], [], "o-", **look)
-        high = 1.05 * np.fmax.reduce([*distances, self.record["tolerance_mm"]])
+        high = 1.05 * np.fmax.reduce([*distances, self.record.tolerance_mm])
         chart.set(xlim=(0, max(len(distances) - 1, 1)), ylim=(0, high))
         chart.set(xlabel="push", title="Distance from the goal (mm)")
         add_grid(chart)

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from markupsafe import Markup
 
+from sainet.control.record import EpisodeRecord
 from sainet.evaluation.summary import Summary
 from sainet.report.arrange import arrange
 from sainet.report.episode_frames import episode_data
@@ -51,7 +52,7 @@ class Report:
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
     replays: Sequence[Replay] = ()
-    episodes: Sequence[Mapping[str, Any]] = ()  # records of `sainet control`
+    episodes: Sequence[EpisodeRecord] = ()
     manifest: Mapping[str, Any] = field(default_factory=dict)
     commands: Sequence[str] = ()
 
