@@ -37,7 +37,7 @@ for folder in (TESTS, TESTS.parent / "src"):
     sys.path.insert(0, str(folder))
 
 from sainet.cli.entry import parse  # noqa: E402
-from sainet.cli.messages import message  # noqa: E402
+from sainet.cli.help import message  # noqa: E402
 from sainet.datasets.config import GenerateConfig  # noqa: E402
 from sainet.datasets.generate import generate  # noqa: E402
 from sainet.datasets.recorded import own  # noqa: E402

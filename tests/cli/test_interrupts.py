@@ -8,8 +8,7 @@ import pytest
 from sainet import cli
 from sainet.cli import entry
 from sainet.cli.generate import Generate
-from sainet.cli.output import Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Output, progress_bar
 from sainet.runs.interrupts import raise_if_interrupted, remembered_interrupts
 
 pytestmark = pytest.mark.filterwarnings(

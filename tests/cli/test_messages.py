@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from sainet.cli.generate import Generate
-from sainet.cli.messages import message
+from sainet.cli.help import message
 from sainet.cli.train import Train
 from sainet.runs.errors import BadInput, BadSetting, unknown_name
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from sainet.cli.output import Output
-from sainet.cli.progress import Pace, progress_bar
+from sainet.cli.output import Output, Pace, progress_bar
 
 PATH = "runs/[test]/[/test]/" + "a" * 80
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from sainet.runs.errors import BadInput, BadStore, RunConflict
 from sainet.runs.documents import (
     atomic_path,
     content_hash,
@@ -23,8 +22,9 @@ from sainet.runs.documents import (
     write_error,
     write_json,
 )
-from sainet.runs.manifest import manifest
+from sainet.runs.errors import BadInput, BadStore, RunConflict
 from sainet.runs.folders import open_run
+from sainet.runs.manifest import manifest
 
 
 def files(folder):
@@ -172,7 +172,9 @@ def test_documents_of_hostile_fields_name_the_field(tmp_path):
         ('{"size": 1, "text": "\\ud800"}', "surrogate|malformed|truncated"),
     ):
         path.write_text(text)
-        with pytest.raises(BadInput, match=f"x.json: .*({says}).*Train it again") as bad:
+        with pytest.raises(
+            BadInput, match=f"x.json: .*({says}).*Train it again"
+        ) as bad:
             read_document(path, Known, remedy="train it again")
         assert len(str(bad.value)) < 300 + len(str(path))
 

@@ -49,9 +49,7 @@ def wait_for(folder: Path, pattern: str, count: int):
 
 @pytest.mark.parametrize("whole_group", [True, False])
 @pytest.mark.parametrize("jobs", [1, 5])  # a worker is idle; jobs are waiting
-def test_an_interruption_quietly_ends_all_jobs(
-    jobs, whole_group, tmp_path
-):
+def test_an_interruption_quietly_ends_all_jobs(jobs, whole_group, tmp_path):
     script = tmp_path / "jobs.py"
     script.write_text(JOBS)
     child = subprocess.Popen(

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_cache
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Json, Output, progress_bar
 from sainet.control.config import ControlConfig
 from sainet.runs.documents import read_json
 from sainet.runs.manifest import MANIFEST

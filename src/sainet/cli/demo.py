@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import Bars
+from sainet.cli.output import Bars, Json, Output
 from sainet.runs.workers import worker_pool
 from sainet.studies.config import DemoConfig
 

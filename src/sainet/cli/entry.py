@@ -17,10 +17,9 @@ from sainet.cli.control import Control
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
 from sainet.cli.generate import Generate
-from sainet.cli.help import option_registry
+from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
-from sainet.cli.messages import message
 from sainet.cli.output import finish
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce

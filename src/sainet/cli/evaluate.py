@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Json, Output, progress_bar
 
 if TYPE_CHECKING:
     from sainet.datasets.store import Store

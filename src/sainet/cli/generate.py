@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Json, Output, progress_bar
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.workers import worker_pool
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Json, Output, progress_bar
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from tyro.conf import Positional
 
 from sainet.cli.devices import use_devices
-from sainet.cli.messages import message
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import Bars
+from sainet.cli.help import message
+from sainet.cli.output import Bars, Json, Output
 from sainet.runs.errors import BadInput, MissingExtra
 from sainet.runs.workers import core_count, worker_pool
 from sainet.studies.config import Scale

@@ -7,8 +7,7 @@ from typing import Annotated
 from tyro.conf import AvoidSubcommands, Positional
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Json, Output
-from sainet.cli.progress import progress_bar
+from sainet.cli.output import Json, Output, progress_bar
 from sainet.learning.recipes import PAPER, ModelKind, Recipe, SingleSteps
 from sainet.runs.errors import BadInput
 

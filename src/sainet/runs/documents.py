@@ -16,7 +16,6 @@ import msgspec
 
 from sainet.runs.errors import BadInput, shown
 
-
 LARGEST_DOCUMENT = 64 << 20  # bytes
 _LONGEST_REASON = 200  # characters of a message that quote a file
 T = TypeVar("T")

@@ -1,10 +1,12 @@
 """Run folders: settings, manifest and outputs of one command, resumable."""
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary, finalize
 
 from sainet.runs.documents import (
     read_document,
@@ -15,8 +17,53 @@ from sainet.runs.documents import (
     write_json,
 )
 from sainet.runs.errors import RunConflict, shown
-from sainet.runs.locks import FolderLock, lock_folder
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
+
+try:
+    import fcntl
+except ImportError:  # without POSIX, folders are not locked
+    fcntl = None
+
+
+class FolderLock:
+    """Exclusive lock on a folder.
+
+    It is released with its last reference and with the process, even by `kill -9`.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        """Take over the lock of a file descriptor."""
+        finalize(self, os.close, descriptor)
+
+
+_held: WeakValueDictionary[str, FolderLock] = WeakValueDictionary()
+
+
+def lock_folder(folder: Path) -> FolderLock | None:
+    """Return the lock of a folder, or None if the system has no locks.
+
+    A lock that this process already holds is returned again, for example after an
+    exception whose traceback keeps it.
+
+    Raises:
+        BlockingIOError: another process holds the lock.
+    """
+    place = os.path.realpath(folder)
+    if (known := _held.get(place)) is not None:
+        return known
+    if fcntl is None:
+        return None
+    descriptor = os.open(place, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, BlockingIOError):
+            raise
+        return None  # the file system has no locks
+    lock = _held[place] = FolderLock(descriptor)
+    return lock
+
 
 CONFIG = "config.json"
 
@@ -115,5 +162,3 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
                 f"{path / CONFIG}: {shown(name)} is {shown(found.get(name))}, not "
                 f"{shown(wanted.get(name))}; choose another `out` or the same settings."
             )
-
-

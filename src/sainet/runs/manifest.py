@@ -10,7 +10,6 @@ from typing import Any
 
 import msgspec
 
-
 MANIFEST = "manifest.json"
 _PACKAGES = (
     *("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr"),
