@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from sainet.evaluation.as_json import to_json_object
-from sainet.evaluation.conditions import Condition, Header, Provenance
 from sainet.evaluation.joining import add_models, join, pool_trainings
 from sainet.evaluation.measurements import (
+    Condition,
+    Header,
     Measurements,
+    Provenance,
     measurements_of,
     read_measurements,
 )

@@ -5,10 +5,9 @@ import pytest
 from scipy.stats import t as student_t
 
 from sainet.evaluation.as_json import to_json_object
-from sainet.evaluation.conditions import Condition, Header
 from sainet.evaluation.intervals import Sample
 from sainet.evaluation.joining import pool_trainings
-from sainet.evaluation.measurements import measurements_of
+from sainet.evaluation.measurements import Condition, Header, measurements_of
 from sainet.evaluation.metrics import (
     MEASURED,
     final_errors,

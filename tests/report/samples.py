@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 
 from sainet.control.record import EpisodeRecord
-from sainet.evaluation.conditions import Condition, PublishedValues
+from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Comparison, Estimate, Factor, Row, Summary
 from sainet.models.identity import identity_named
 from sainet.report.replay import Replay, Track

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 import msgspec
 
 from report import samples
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Estimate
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.report.palette import style_of

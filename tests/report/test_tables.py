@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from report import samples
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.models.identity import identity_named
 from sainet.report.arrange import arrange

@@ -4,7 +4,7 @@ import pytest
 
 from report import samples
 from sainet.evaluation.claims import PUBLISHED_ORDER
-from sainet.evaluation.conditions import Condition, PublishedValues
+from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 from sainet.models.identity import ModelId, identity_named

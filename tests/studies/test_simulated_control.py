@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 from sainet.report.arrange import arrange

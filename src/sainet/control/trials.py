@@ -21,8 +21,7 @@ from sainet.control.record import (
 )
 from sainet.control.trial import make_trial
 from sainet.engines import make_engine
-from sainet.evaluation.conditions import Condition, Header
-from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.measurements import Condition, Header, Measurements
 from sainet.models.identity import ModelId
 from sainet.models.library import Model, load_model
 from sainet.planning import make_planner

@@ -1,1 +1,1 @@
-"""How far predictions are from what happened, with intervals."""
+"""Errors of predictions with their intervals, and success of control trials."""

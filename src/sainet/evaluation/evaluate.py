@@ -11,9 +11,15 @@ from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
-from sainet.evaluation.conditions import Condition, Header, Provenance, TestSet
-from sainet.evaluation.conditions import Training as TrainingRun
-from sainet.evaluation.measurements import Measurements, measurements_of
+from sainet.evaluation.measurements import (
+    Condition,
+    Header,
+    Measurements,
+    Provenance,
+    TestSet,
+    measurements_of,
+)
+from sainet.evaluation.measurements import Training as TrainingRun
 from sainet.evaluation.metrics import (
     MEASURED,
     REFERENCE_DISTANCE,
@@ -85,7 +91,7 @@ class EndOffsets:
     place: Float[np.ndarray, "push 2"]  # m, of the disk before the push
     heading: Float[np.ndarray, " push"]  # rad, of the push on the table
     offset: Float[np.ndarray, "push 2"]  # m, observed minus predicted, on the table
-    turn: Float[np.ndarray, " push"]  # rad, likewise
+    turn: Float[np.ndarray, " push"]  # rad, observed minus predicted
 
     @property
     def along(self) -> Float[np.ndarray, " push"]:
@@ -153,7 +159,7 @@ def _limit(store: Store, steps: int | None) -> int:
 def _parts_of_one_length(
     arrays: dict[str, np.ndarray], limit: int
 ) -> Iterator[tuple[np.ndarray, int]]:
-    """Yield the indices of pushes of one length, and how much of it is predicted."""
+    """Yield the indices of pushes of one length, and the steps to predict."""
     lengths = np.minimum(arrays["steps"], limit)
     for length in np.unique(lengths):
         yield np.flatnonzero(lengths == length), int(length)

@@ -1,12 +1,12 @@
 """Means over pushes with 95 % bootstrap intervals, and paired differences.
 
-A network that was trained several times has an axis of trainings before that of pushes:
-another training differs as another set of test pushes does. Pushes are resampled. A
-handful of trainings is too few for that (the bootstrap's intervals of 5 would hold the
-truth 84 times in 100, of 3 75 times): to each resample comes a draw of Student's t,
-times the standard error over trainings, which gives the t interval where pushes are
-many. Of a cross-validation folds are resampled, then the pushes in each: pushes of one
-fold were predicted by the same network.
+A network of several training runs has an axis of runs before that of pushes: another
+run differs as another set of test pushes does. Pushes are resampled. Runs are too few
+for a bootstrap (95 % intervals of 5 runs would contain the true mean 84 times in 100,
+those of 3 runs 75 times). Instead, each resample gets a draw of Student's t, times the
+standard error over runs, which gives the t interval where pushes are many. In a
+cross-validation, folds are resampled first, then the pushes in each fold: all pushes of
+a fold were predicted by the same network.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _SEED = 0
 _ENDS = (2.5, 97.5)  # percentiles
 _FLOOR = 1e-12  # of a denominator
 
-Values = Float[np.ndarray, "... push quantity"]  # maybe an axis of trainings first
+Values = Float[np.ndarray, "... push quantity"]  # maybe an axis of training runs first
 Folds = tuple[int, ...]  # of each push
 Interval = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, low, high
 
@@ -30,7 +30,7 @@ class Sample:
     """Values of some pushes, and their means over resamples, which are drawn once.
 
     Attributes:
-        values: one for each push and quantity, maybe with an axis of trainings first.
+        values: of each push and quantity, maybe with an axis of training runs first.
         folds: of each push, in a cross-validation.
     """
 
@@ -39,18 +39,18 @@ class Sample:
 
     @cached_property
     def mean(self) -> Float[np.ndarray, " quantity"]:
-        """The means over pushes (and trainings)."""
+        """The means over pushes (and training runs)."""
         return self.values.mean(axis=tuple(range(self.values.ndim - 1)))
 
     @cached_property
     def _by_resample(self) -> tuple[np.ndarray, np.ndarray | None, int]:
-        """The mean of each resample, its standard error over trainings, their number.
+        """Mean of each resample, its standard error over training runs, their number.
 
         Samples of as many pushes have the same resamples.
         """
         whole = self.values.reshape(-1, *self.values.shape[-2:])
         trainings, pushes, quantities = whole.shape
-        if pushes < 2:  # noqa: PLR2004  (one push says nothing of others)
+        if pushes < 2:  # noqa: PLR2004  (one push has no spread)
             return np.full((RESAMPLES, quantities), np.nan), None, trainings
         shares = _shares(pushes) if self.folds is None else _shares_of_folds(self.folds)
         by_training = np.stack([shares @ one for one in whole])
@@ -60,15 +60,15 @@ class Sample:
         return mean, by_training.std(axis=0, ddof=1) / np.sqrt(trainings), trainings
 
     def drawn(self, which: int = 0) -> Float[np.ndarray, "sample quantity"]:
-        """Return the mean of each resample, with the luck of its trainings.
+        """Return the mean of each resample, with the scatter of its training runs.
 
         Args:
-            which: of two sets of trainings, whose luck is drawn apart.
+            which: of two sets of training runs, whose scatter is drawn independently.
         """
         mean, standard_error, trainings = self._by_resample
         if standard_error is None:
             return mean
-        return mean + standard_error * _luck(trainings, which)[:, None]
+        return mean + standard_error * _scatter(trainings, which)[:, None]
 
     @property
     def interval(self) -> Interval:
@@ -91,15 +91,15 @@ class Sample:
 
 
 @lru_cache(maxsize=4)
-def _luck(trainings: int, which: int) -> Float[np.ndarray, " sample"]:
-    """Return how far off the mean of so many trainings is, in standard errors."""
+def _scatter(trainings: int, which: int) -> Float[np.ndarray, " sample"]:
+    """Return the deviation of a mean over training runs, in standard errors."""
     rng = np.random.default_rng((_SEED, 1 + which, trainings))
     return rng.standard_t(trainings - 1, RESAMPLES)
 
 
 @lru_cache(maxsize=4)
 def _shares(count: int) -> Float[np.ndarray, "sample count"]:
-    """Return how much of each resample every one of so many pushes makes up."""
+    """Return the share of every push in each resample."""
     rng = np.random.default_rng((_SEED, count))
     return rng.multinomial(count, [1 / count] * count, size=RESAMPLES) / count
 

@@ -11,8 +11,7 @@ import xarray as xr
 from msgspec.structs import replace
 
 from sainet.datasets.splits import Fold
-from sainet.evaluation.conditions import Header
-from sainet.evaluation.measurements import PUSHES, Measurements
+from sainet.evaluation.measurements import PUSHES, Header, Measurements
 from sainet.models.identity import ModelId
 
 T = TypeVar("T")

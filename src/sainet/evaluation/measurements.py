@@ -17,10 +17,12 @@ import msgspec
 import numpy as np
 import xarray as xr
 
-from sainet.evaluation.conditions import Condition, Header, PublishedValues
+from sainet.models.identity import ModelId
 from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadInput
+from sainet.runs.manifest import Manifest
 
+FORMAT_VERSION = 1
 PUSHES, TRIALS = ("model", "training", "sample", "body"), ("model", "sample")
 DIMENSIONS = {
     **dict.fromkeys(("pos_mm", "rot_deg", "final_pos_mm", "final_rot_deg"), PUSHES),
@@ -40,6 +42,66 @@ _FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 9, "lc": 0, "lp": 2, "pb": 2}]
 _REMEDY = "give a file of measurements that sainet wrote"
 
 
+class Condition(msgspec.Struct, frozen=True, kw_only=True):
+    """Pushes or trials that are reported together."""
+
+    label: str = ""  # empty: all samples, without a name
+    # What sets it apart: training_pushes, surface, l2, planner, goals, ...
+    factors: dict[str, float | str] = {}
+    parts: tuple[str, ...] = ()  # labels of other conditions that it joins
+
+
+class PublishedValues(msgspec.Struct, frozen=True, kw_only=True):
+    """Numbers from a publication, to stand beside measured ones."""
+
+    condition: str
+    model: ModelId
+    values: dict[str, tuple[float | None, ...]]  # by metric, one for each body
+    trials: int | None = None  # of control trials
+
+
+class Training(msgspec.Struct, frozen=True, kw_only=True):
+    """The origin of one training run of a model."""
+
+    model: str  # slug
+    seed: int | None = None
+    weights: str = ""  # hash of the weights
+    data: str = ""  # hash of the training data
+    iterations: int | None = None
+    final_loss: float | None = None
+
+
+class TestSet(msgspec.Struct, frozen=True, kw_only=True):
+    """The origin of the pushes or trials of one condition."""
+
+    condition: str
+    data: str = ""  # hash of the dataset
+    settings: dict[str, object] = {}  # that made it
+
+
+class Provenance(msgspec.Struct, frozen=True, kw_only=True):
+    """What measurements were made by: command, data, weights and machine."""
+
+    command: tuple[str, ...] = ()
+    note: str = ""  # on their origin, for readers
+    tests: tuple[TestSet, ...] = ()
+    trainings: tuple[Training, ...] = ()
+    manifest: Manifest | None = None
+
+
+class Header(msgspec.Struct, frozen=True, kw_only=True):
+    """Everything about measurements that is not a number per sample."""
+
+    models: tuple[ModelId, ...]
+    conditions: tuple[Condition, ...] = (Condition(),)
+    reference_m: float = 0.25  # distance that trans (%) relates to
+    published: tuple[PublishedValues, ...] = ()
+    # Published predictions are models, but have no training and no interval.
+    predictions: tuple[str, ...] = ()  # their slugs
+    provenance: Provenance = Provenance()
+    format_version: int = FORMAT_VERSION
+
+
 @dataclass(frozen=True)
 class Measurements:
     """A checked dataset of errors or trials, with the identities behind it."""
@@ -52,7 +114,7 @@ class Measurements:
         for name, variable in self.data.variables.items():
             wanted = DIMENSIONS.get(str(name))
             if wanted is None:
-                wanted = PUSHES  # an error that somebody added
+                wanted = PUSHES  # a further error
             if variable.dims != wanted:
                 raise ValueError(f"{name} has dimensions {variable.dims}, not {wanted}")
         sizes = self.data.sizes
@@ -138,7 +200,7 @@ class Measurements:
 
     def to_bytes(self) -> bytes:
         """Return the NetCDF-3 file: equal measurements are equal bytes."""
-        # In one order, whatever the order in which variables were added.
+        # Sorted, so that the order of adding variables does not matter.
         names = sorted(str(name) for name in self.data.variables)
         parts = {n: (self.data[n].dims, self.data[n].values) for n in names}
         header = msgspec.json.encode(self.header).decode()
@@ -165,7 +227,7 @@ def measurements_of(
 
     Args:
         errors: each ``[model, training, push, body]``.
-        travel_mm: how far each body was moved (mm), ``[push, body]``.
+        travel_mm: distance between initial and final position, ``[push, body]``.
         header: names the models and conditions.
         condition: number of the condition of each push.
         row: of each push in its dataset.

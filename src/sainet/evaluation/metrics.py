@@ -1,6 +1,6 @@
-"""Errors of predicted pushes: what is measured of each push, and what tables show.
+"""Errors of predicted pushes: those measured on each push, and those in tables.
 
-A new error is one entry of `MEASURED` if it is measured otherwise, and one `Metric`.
+A new error is one `Metric`, and one entry of `MEASURED` if it needs a new measurement.
 """
 
 from collections.abc import Callable, Mapping
@@ -72,7 +72,7 @@ class ModelErrors:
 
 @dataclass(frozen=True)
 class Metric:
-    """One number of a table: what it is called, and how it follows from the errors."""
+    """One number of a table: its name, its unit, and its estimator from the errors."""
 
     key: str
     name: str
@@ -151,7 +151,7 @@ def final_errors(
 def travel_mm(
     initial: Float[np.ndarray, "push body 3"], final: Float[np.ndarray, "push body 3"]
 ) -> Float[np.ndarray, "push body"]:
-    """Return how far each body was moved (mm)."""
+    """Return the distance between initial and final position of each body (mm)."""
     return 1000 * np.linalg.norm(final[..., :2] - initial[..., :2], axis=-1)
 
 

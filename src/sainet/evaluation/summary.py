@@ -7,9 +7,13 @@ from itertools import combinations
 import msgspec
 import numpy as np
 
-from sainet.evaluation.conditions import Condition, Provenance, PublishedValues
 from sainet.evaluation.intervals import Folds, Interval, Sample
-from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.measurements import (
+    Condition,
+    Measurements,
+    Provenance,
+    PublishedValues,
+)
 from sainet.evaluation.metrics import MEASURED, METRICS, ModelErrors
 from sainet.evaluation.trials import TrialRow, TrialTest, compare_trials, trial_rows
 from sainet.models.identity import ModelId

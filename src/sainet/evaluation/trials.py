@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Bool
 from scipy.stats import binomtest
 
-from sainet.evaluation.conditions import Condition
-from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.measurements import Condition, Measurements
 
 # What an episode reaches or does not.
 MEASURES = ("solved", "within_4_mm", "within_25_pushes")

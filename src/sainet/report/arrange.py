@@ -1,4 +1,4 @@
-"""Tables arranged from summaries: what stands in which line and column.
+"""Tables arranged from summaries: the content of each line and column.
 
 A line for each model in each condition, a column for each metric and body, the best
 model of a column marked, published numbers apart, and sentences below.
@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sainet.evaluation.claims import LEVEL, TRUE_PROPERTIES
-from sainet.evaluation.conditions import PublishedValues
+from sainet.evaluation.measurements import PublishedValues
 from sainet.evaluation.metrics import METRICS, Metric
 from sainet.evaluation.summary import BASELINE, Estimate, Row, Summary
 from sainet.evaluation.trials import TrialRow
@@ -97,7 +97,7 @@ def _published(summary: Summary) -> Iterator[_Values]:
 def _without_twins(
     lines: list[_Values], summary: Summary
 ) -> tuple[list[_Values], list[str]]:
-    """Leave out true-property physics where it makes no difference, and say so."""
+    """Leave out true-property physics where it makes no difference, with a note."""
     others = {line.condition: line for line in lines if line.model.slug == BASELINE}
     twins = [
         line
@@ -111,12 +111,12 @@ def _without_twins(
         return kept, []
     names = labels_of(summary.models)
     where = ", ".join(twin.condition for twin in twins if twin.condition)
-    told = (
+    note = (
         f"{f'{where}: ' if where else ''}{names[TRUE_PROPERTIES]}, has the same errors "
         f"as {names[BASELINE]} and is left out: true masses and radii do not change "
         "these predictions."
     )
-    return kept, [told]
+    return kept, [note]
 
 
 def _are_alike(one: _Values, other: _Values) -> bool:

@@ -23,7 +23,7 @@ _EPISODE = {
     "--other": (OTHER, "#9aa0a6"),
     "--target": (TARGET, "#d9b40a"),
 }
-_LONGEST = 40  # characters of a label; of a longer name, a folder say, the end counts
+_LONGEST = 40  # characters of a label; a longer name, such as a folder, keeps its end
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ _SPARE = (
 def styles_of(names: Iterable[str]) -> dict[str, ModelStyle]:
     """Return the style of each name, in order.
 
-    A model that the package does not know gets a spare colour and its dash, chosen by
+    A model without a style of its own gets a spare colour and its dash, chosen by
     its name, or the next free ones if another model here has them already.
     """
     styles: dict[str, ModelStyle] = {}

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 DASH = "–"  # noqa: RUF001  (an en dash stands for a missing number)
 NOTE = (
-    "Small print: 95 % interval over pushes, and over trainings if there are several. "
-    "Bold: the best of a column."
+    "Small print: 95 % interval over pushes, and over training runs if there are "
+    "several. Bold: the best of a column."
 )
 EMPTY = "Nothing to show: the evaluation has no numbers."
 
@@ -56,7 +56,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Table:
-    """Everything that a table shows, whatever prints it."""
+    """The content of a table, for any writer."""
 
     columns: tuple[Column, ...]
     lines: tuple[Line, ...]

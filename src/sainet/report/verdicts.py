@@ -22,7 +22,7 @@ from sainet.report.table import DASH
 
 
 def verdicts_on(summary: Summary) -> tuple[str, ...]:
-    """Return what a reader should take from a table.
+    """Return the verdicts on a summary.
 
     Of errors, a sentence for each condition: the best network beside the engine. Of
     trials, which models solved more goals than others; nothing for a single model.
@@ -106,7 +106,7 @@ def _signed(value: float | None) -> str:
 
 
 def trial_sentences(summary: Summary) -> Iterator[str]:
-    """Yield what noise ended early, and which goals only one model of two reached."""
+    """Yield trials that noise ended early, and goals that one of two models reached."""
     labels = labels_of(summary.models)
     for row in summary.trials:
         if row.ended_early:
@@ -125,7 +125,7 @@ def trial_sentences(summary: Summary) -> Iterator[str]:
 
 
 def _is_reported(test: TrialTest) -> bool:
-    """Report every difference in success, and of other measures what is not chance."""
+    """Report every difference in success; of other measures, those with a small p."""
     if test.measure == "solved":
         return bool(test.only_one or test.only_other)
     return test.p < CHANCE

@@ -105,20 +105,20 @@ def print_estimates(found: Identified, console: Console) -> None:
     """Print each estimate, parameters that are not identifiable, and the errors.
 
     Args:
-        found: what was identified.
+        found: the estimates, before and after.
         console: to print on.
     """
     table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, heading in enumerate(_ESTIMATE_HEADINGS):
         table.add_column(heading, justify="right" if index else "left")
     for estimate in found.estimates:
-        told = not estimate.doubt
+        is_known = not estimate.doubt
         interval = f"{estimate.low:.3g} to {estimate.high:.3g}"
         cells = (
             estimate.name.replace("_", " "),
             f"{estimate.start:.3g}",
-            f"{estimate.value:.3g}" if told else "kept",
-            interval if told else "–",
+            f"{estimate.value:.3g}" if is_known else "kept",
+            interval if is_known else "–",
         )
         table.add_row(*map(Text, cells))
     console.print(table)

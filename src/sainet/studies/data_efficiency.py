@@ -4,7 +4,7 @@ import numpy as np
 
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.paper_setup import IN, SAIN, PaperSetup

@@ -14,7 +14,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
 from sainet.models.library import Model

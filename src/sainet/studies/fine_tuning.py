@@ -8,7 +8,7 @@ import numpy as np
 
 from sainet.datasets.store import Store
 from sainet.datasets.surrogate import ROBOTS, Robot, record, simulated_pushes
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId

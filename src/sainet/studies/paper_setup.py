@@ -8,7 +8,7 @@ from msgspec import structs
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import FINE_TUNING, PAPER, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.library import PHYSICS

@@ -13,7 +13,7 @@ from dataclasses import replace
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.surrogate import LONG_PUSHES
 from sainet.engines.simulator import SIMULATORS
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER, FromModel
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import IN, SAIN, SAIN_BULLET, PaperSetup, physics

@@ -1,6 +1,6 @@
 """Numbers that the paper publishes (Ajay et al., ICRA 2019), to stand beside ours."""
 
-from sainet.evaluation.conditions import PublishedValues
+from sainet.evaluation.measurements import PublishedValues
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import IN, SAIN, physics
 

@@ -15,10 +15,9 @@ import numpy as np
 
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
-from sainet.evaluation.conditions import Condition
 from sainet.evaluation.evaluate import EndOffsets, end_offsets
 from sainet.evaluation.joining import add_models, join_folds, without_predictions
-from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.measurements import Condition, Measurements
 from sainet.learning.recipes import Features, ModelKind
 from sainet.models.library import Model
 from sainet.studies.recorded_models import Inside, Learned, Tuner, Variant, surfaces_of

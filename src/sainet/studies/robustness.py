@@ -11,7 +11,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
 from sainet.datasets.writer import derive
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.scenes.geometry import wrap_angle
 from sainet.studies.paper_setup import NETWORKS, PaperSetup
 from sainet.studies.paper_tables import SEEDS

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from sainet.control.config import ControlConfig
 from sainet.engines.simulator import SIMULATORS
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import IN, SAIN
 from sainet.studies.published import PUBLISHED_SIMULATED_CONTROL

@@ -16,10 +16,9 @@ from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import Store
-from sainet.evaluation.conditions import Condition
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join, pool_trainings
-from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.measurements import Condition, Measurements
 from sainet.identification.identify import identify_into
 from sainet.learning.fit import FitResult, fit
 from sainet.learning.log import loss_note

@@ -11,9 +11,8 @@ from sainet.datasets.store import Store, open_store
 from sainet.engines import make_engine
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.claims import Claim
-from sainet.evaluation.conditions import PublishedValues
 from sainet.evaluation.evaluate import EndOffsets
-from sainet.evaluation.measurements import Measurements
+from sainet.evaluation.measurements import Measurements, PublishedValues
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.report.figures.engine_errors import draw_engine_errors

@@ -3,7 +3,7 @@
 import numpy as np
 from msgspec import structs
 
-from sainet.evaluation.conditions import Condition
+from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.learning.recipes import SingleSteps
 from sainet.studies.paper_setup import IN, SAIN, PaperSetup

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
+from sainet.evaluation.metrics import METRICS
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.report.figures.canvas import (
     add_grid,
@@ -20,6 +21,7 @@ from sainet.report.palette import ModelStyle, styles_of
 
 FACTOR = "training_pushes"
 _METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
+_TICKS = (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 15, 20)  # mm or degrees
 _WIDE = 4  # ratio of errors from which a scale is logarithmic
 
 
@@ -51,6 +53,7 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         for row in summary.rows
         if row.condition in sizes
     ]
+    end = "final " if any(METRICS[f.metric].is_of_end for f in summary.factors) else ""
     styles = styles_of(each.row.model for each in rows)
     bodies = sorted({each.row.body for each in rows})
     cases = [(metric, body) for metric in _METRICS for body in bodies]
@@ -61,7 +64,7 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         for (metric, body), axes in zip(cases, panels, strict=True):
             _set_axes(axes, sorted(sizes.values()))
             axes.set_title(f"Disk {body}")
-            axes.set_ylabel(f"mean {_METRICS[metric]}")
+            axes.set_ylabel(f"mean {end}{_METRICS[metric]}")
             for name, style in styles.items():
                 _draw_model(axes, style, _of(rows, name, body), metric)
             _set_scale(axes)
@@ -113,6 +116,6 @@ def _set_scale(axes: Axes) -> None:
     if axes.dataLim.y1 < _WIDE * axes.dataLim.y0:
         return
     axes.set_yscale("log")
-    axes.yaxis.set_major_locator(FixedLocator([0.2, 0.5, 1, 2, 5, 10, 20]))
+    axes.yaxis.set_major_locator(FixedLocator(_TICKS))
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter(NullFormatter())

@@ -18,7 +18,7 @@ def render_text(name: str, **values: object) -> str:
 
 
 def read(name: str) -> str:
-    """Return a style sheet or a script that lies beside the templates."""
+    """Return a style sheet or a script from the folder of templates."""
     return resources.files(__name__).joinpath("templates", name).read_text("utf-8")
 
 

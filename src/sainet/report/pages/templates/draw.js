@@ -38,7 +38,7 @@ function drawDot(context, place, radius, color) {
   context.fill();
 }
 
-// A mark on the rim, by which one sees the disk turn.
+// A mark on the rim, so that rotation is visible.
 function drawMark(context, view, pose, radius, inner) {
   const ray = [Math.cos(pose.angle) * radius, Math.sin(pose.angle) * radius];
   const end = (share) => view.at(pose.x + share * ray[0], pose.y + share * ray[1]);
@@ -67,7 +67,7 @@ function drawOutline(context, view, pose, radius, look) {
   drawDot(context, view.at(pose.x, pose.y), 2.5, look.color);
 }
 
-// The way so far, older parts fainter; `placeAt` tells where it was at a step.
+// The path so far, older parts fainter; `placeAt` returns the place at a step.
 function drawTrail(context, view, placeAt, step, color, width) {
   strokeWith(context, color, width);
   for (let piece = 0; piece < TRAIL_PIECES; piece += 1) {

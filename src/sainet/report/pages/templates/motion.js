@@ -17,7 +17,7 @@ function poseAt(track, body, step) {
   return { x: between(x, step), y: between(y, step), angle: between(angle, step) };
 }
 
-// A prediction pushed away from the truth, so that small differences can be seen.
+// A prediction moved away from the truth, so that small differences are visible.
 function exaggerate(truth, pose, factor) {
   if (factor === 1) return pose;
   const stretched = (name) => truth[name] + factor * (pose[name] - truth[name]);

@@ -105,7 +105,7 @@ class Transport {
   }
 }
 
-// Starts by itself the first time that it is seen, unless motion is unwelcome.
+// Starts when it first becomes visible, unless the reader prefers reduced motion.
 function playWhenSeen(player) {
   if (window.matchMedia("(prefers-reduced-motion: reduce)").matches) return;
   const observer = new IntersectionObserver((entries) => {
