@@ -1,10 +1,12 @@
 """Help texts: whole paragraphs, one default each, plain words."""
 
 import re
+from dataclasses import fields
 
 import pytest
 
 from sainet.cli import entry
+from sainet.cli.generate import Settings
 from sainet.cli.help import field_texts
 
 COMMANDS = [
@@ -120,3 +122,7 @@ def test_texts_are_joined_by_paragraph():
         "one": "A text that goes on here.\n\nAnother paragraph.",
         "three": "(mm) Starts with no letter `or goes on` with none.",
     }
+
+
+def test_inherited_settings_keep_their_texts():
+    assert field_texts(Settings).keys() == {each.name for each in fields(Settings)}

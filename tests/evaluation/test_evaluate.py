@@ -10,9 +10,15 @@ from msgspec import structs
 from learning.stores import end_points_alone, info_of, made_up, quiet_store, write
 from models.samples import quick_dynamics
 from sainet.datasets.batch import to_batch
-from sainet.engines import make_engine
+from sainet.engines import make_engine, simulator
 from sainet.engines.base import AssumedProperties
-from sainet.engines.simulator import Assumptions
+from sainet.engines.simulator import (
+    TRUE_PROPERTIES,
+    Assumptions,
+    InternalEngine,
+    PlanarSpec,
+    stored_simulator,
+)
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import pool_trainings
@@ -22,7 +28,8 @@ from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.identity import ModelId
 from sainet.models.library import Model, load_model
 from sainet.runs.digests import digests_to_text
-from sainet.runs.errors import BadCheckpoint, BadInput, Diverged
+from sainet.runs.errors import BadCheckpoint, BadInput, Diverged, UnknownName
+from sainet.scenes.camera import CameraOffset
 from sainet.scenes.state import State, Trajectory
 
 PUSHES = 11
@@ -243,3 +250,47 @@ def test_two_models_of_one_name_are_refused(simulated):
 def test_steps_that_the_pushes_do_not_have_are_refused(simulated, steps):
     with pytest.raises(BadInput, match=f"`steps` is {steps}; .* has 12"):
         evaluate([resting()], simulated, steps=steps)
+
+
+def test_stored_predictions_replace_the_engine(simulated):
+    """The store's predictions are made up: no engine makes such ones."""
+    found = evaluate([load_model("physics")], simulated)
+    arrays = simulated.read(slice(None))
+    far = np.linalg.norm(
+        (arrays["simulated_planar"] - arrays["truth"])[..., :2].astype(float), axis=-1
+    )
+    wanted = [1000 * far[push, :steps].mean(0) for push, steps in enumerate(LENGTHS)]
+    np.testing.assert_allclose(
+        found.values("pos_mm", "physics").reshape(PUSHES, 2), wanted, rtol=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    "internal",
+    [
+        InternalEngine(PlanarSpec(version=2)),
+        InternalEngine(PlanarSpec(pressure_radius_ratio=0.5)),
+        InternalEngine(PlanarSpec(assumptions=TRUE_PROPERTIES)),
+        InternalEngine(PlanarSpec(), CameraOffset(x=1e-3)),
+    ],
+)
+def test_other_predictions_are_not_taken_from_the_store(simulated, internal):
+    assert simulated.prediction(InternalEngine(PlanarSpec())).is_stored
+    assert not simulated.prediction(internal).is_stored
+
+
+def test_a_later_engine_has_another_name_in_datasets(simulated, monkeypatch):
+    later = PlanarSpec(version=2)
+    monkeypatch.setattr(simulator, "SIMULATORS", {"planar": later})
+    assert later.slug == "planar"
+    assert not simulated.prediction(InternalEngine(later)).is_stored
+    with pytest.raises(UnknownName, match="No simulator named 'planar'"):
+        stored_simulator("planar")
+
+
+def test_simulated_training_pushes_are_refused_as_test_pushes(simulated):
+    seen = digests_to_text(simulated.first(3).push_hashes())
+    card = structs.replace(CARD, pushes=seen, data_seeds=())
+    with pytest.raises(BadCheckpoint, match=rf"trained on 3 of these {PUSHES}"):
+        evaluate([resting(card=card)], simulated)
+    evaluate([resting(card=card)], simulated.take(range(3, PUSHES)))

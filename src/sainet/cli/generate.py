@@ -3,16 +3,30 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tyro.conf import Positional
+
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.workers import worker_pool
+from sainet.worlds.config import SetupName
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(GenerateConfig):
+    """Simulated pushes with the distributions of the paper (section IV-B).
+
+    A range is a uniform distribution between two numbers, or one constant.
+    """
+
+    setup: Positional[SetupName] = "robot"
+    """Setup: robot (the pusher follows a path) or direct-force (a force drives it)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Generate:
     """Simulate pushes with the paper's distributions, and store them as a dataset."""
 
-    config: GenerateConfig = field(default_factory=GenerateConfig)
+    config: Settings = field(default_factory=Settings)
     out: Path
     """Run folder to write; identical settings resume."""
     workers: int | None = None

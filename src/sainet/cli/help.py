@@ -79,6 +79,11 @@ def _default(field: Field[Any], owner: object) -> Any:  # noqa: ANN401
 
 def field_texts(settings: type) -> dict[str, str]:
     """Return the docstring of each field, every paragraph on one line."""
+    classes = reversed(settings.__mro__[:-1])  # without `object`
+    return {name: text for each in classes for name, text in _own_texts(each).items()}
+
+
+def _own_texts(settings: type) -> dict[str, str]:
     (definition,) = ast.parse(dedent(inspect.getsource(settings))).body
     assert isinstance(definition, ast.ClassDef)
     texts = {}

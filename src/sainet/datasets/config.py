@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import get_args
 
-from tyro.conf import Positional
-
 from sainet.engines import ENGINES
 from sainet.engines.simulator import SIMULATORS
 from sainet.runs.errors import require, require_one_of
@@ -19,7 +17,7 @@ class GenerateConfig(WorldConfig):
     A range is a uniform distribution between two numbers, or one constant.
     """
 
-    setup: Positional[SetupName] = "robot"
+    setup: SetupName = "robot"
     """Setup: robot (the pusher follows a path) or direct-force (a force drives it)."""
     pushes: int = 4500
     """Number of pushes."""
