@@ -271,7 +271,7 @@ def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
     assert json.loads(done.stdout.splitlines()[-1])["model"] == "in"
     card = json.loads((tmp_path / "tuned/card.json").read_text())
     assert card["started_from"]
-    assert card["config"]["l2"] == 1e-3
+    assert card["recipe"]["l2"] == 1e-3
     words = ("identify", "--data", pushes, "--out", tmp_path / "mine")
     found = sainet(*words, "--json", "--quiet").stdout
     estimates = json.loads(found.splitlines()[-1])["estimates"]

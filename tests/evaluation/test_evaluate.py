@@ -8,6 +8,7 @@ import pytest
 from msgspec import structs
 
 from learning.stores import end_points_alone, info_of, made_up, quiet_store, write
+from models.samples import CARD as SAMPLE
 from models.samples import quick_dynamics
 from sainet.datasets.batch import to_batch
 from sainet.engines import make_engine, simulator
@@ -23,7 +24,6 @@ from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import pool_trainings
 from sainet.evaluation.summary import summarise
-from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.identity import ModelId
 from sainet.models.library import Model, load_model
@@ -176,17 +176,7 @@ def test_the_true_engine_has_no_error(tmp_path_factory):
         assert found.values(name, "physics").mean() > 100 * tolerance
 
 
-CARD = Card(
-    identity=ModelId(kind="in"),
-    kind="robot",
-    time_step=1 / 240,
-    truth_engine="planar",
-    data="",
-    data_seeds=(17,),
-    weights="",
-    config={},
-    manifest={},
-)
+CARD = structs.replace(SAMPLE, data_seeds=(17,))
 
 
 def test_networks_are_refused_on_other_pushes_unless_forced(simulated):

@@ -128,7 +128,7 @@ def test_a_fine_tuned_additive_network_stays_additive(store, tmp_path):
     fit("sain", store, residual, first)
     network, card = load_network(first)
     assert network.integrator == RelaxingResidual()
-    assert (card.residual, card.started_from) == (True, None)
+    assert (card.integrator, card.started_from) == ("relaxing-residual", None)
     assert np.abs(network.dyn.weights[-1]).max() > 0  # it has learned something
     task = Task("sain", store, residual, PLANAR)
     silent = begin(task)[0].network
@@ -172,7 +172,7 @@ def test_the_best_network_on_the_validation_pushes_is_kept(
         tmp_path / "out",
     )
     # The first figure is of the start, the third, of iteration 2, is the best.
-    assert [line["iteration"] for line in result.history] == [1, 2, 3, 4, 5, 6]
+    assert [line.iteration for line in result.history] == [1, 2, 3, 4, 5, 6]
     for found, wanted in zip(
         layers(tmp_path / "out"), jax.tree.leaves(kept[2]), strict=True
     ):

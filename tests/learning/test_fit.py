@@ -22,7 +22,7 @@ from sainet.datasets.schema import simulated_name
 from sainet.learning import fit as fit_module
 from sainet.learning.fit import STATE, fit
 from sainet.learning.held import predict_batch
-from sainet.learning.log import LOG, append_log, read_log, rewind_log
+from sainet.learning.log import LOG, LogLine, append_log, read_log, rewind_log
 from sainet.learning.recipes import PAPER
 from sainet.learning.task import Task, begin
 from sainet.models.card import CARD, WEIGHTS, read_card
@@ -65,7 +65,7 @@ def contents(folder):
 
 
 def losses(result, name):
-    return np.array([line[name] for line in result.history])
+    return np.array([getattr(line, name) for line in result.history])
 
 
 def test_training_reduces_training_and_test_losses(trained):
@@ -81,9 +81,9 @@ def test_a_training_run_writes_network_card_and_log(trained, store):
     assert card.weights == content_hash(files[WEIGHTS])
     assert (card.kind, card.truth_engine) == ("robot", "planar")
     assert card.data == store.content
-    assert card.manifest["devices"] == jax.device_count()
+    assert card.manifest.devices == jax.device_count()
     assert read_log(trained.folder) == trained.history
-    assert [line["iteration"] for line in trained.history] == list(range(5, 61, 5))
+    assert [line.iteration for line in trained.history] == list(range(5, 61, 5))
     assert load_model(str(trained.folder)).card == card
 
 
@@ -248,7 +248,7 @@ def test_at_least_one_push_remains_for_training(store, tmp_path):
 
 
 def test_a_log_drops_lines_after_the_checkpoint(tmp_path):
-    lines = [{"iteration": i, "loss": 1 / i} for i in (5, 10, 15)]
+    lines = (LogLine(5, 0.2), LogLine(10, 0.1, 0.3), LogLine(15, 0.05))
     for line in lines:
         append_log(tmp_path, line)
     with (tmp_path / LOG).open("a") as file:
@@ -263,7 +263,7 @@ def test_a_log_drops_lines_after_the_checkpoint(tmp_path):
     [b"{", b"[]", b'{"loss": 1}', b'{"iteration": 1, "loss": "x"}', b"\xff", b""],
 )
 def test_a_damaged_line_of_a_log_is_named(tmp_path, line):
-    append_log(tmp_path, {"iteration": 5, "loss": 1.0})
+    append_log(tmp_path, LogLine(5, 1.0))
     with (tmp_path / LOG).open("ab") as file:
         file.write(line + b"\n")
     says = rf"^{re.escape(str(tmp_path / LOG))}: line 2 is damaged.*run the same"

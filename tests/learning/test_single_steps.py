@@ -121,9 +121,9 @@ def test_force_driven_pushes_cannot_restart():
 
 
 def test_the_card_records_single_step_training(trained):
-    found = np.array([line["loss"] for line in trained.history])
+    found = np.array([line.loss for line in trained.history])
     assert found[-2:].mean() < 0.8 * found[0]
-    assert not read_card(trained.folder).recurrent
+    assert read_card(trained.folder).has_single_steps
     model = load_model(str(trained.folder)).dynamics
     assert isinstance(model, Restarted)
     assert isinstance(model.model, SimulatorAugmented)

@@ -14,7 +14,8 @@ from sainet.datasets.config import GenerateConfig
 from sainet.engines.base import AbstractEngine, AssumedProperties
 from sainet.engines.simulator import PAPER, InternalEngine
 from sainet.identification.parameters import to_engine
-from sainet.models.card import IDENTIFIED, Identified
+from sainet.learning.recipes import PAPER as PAPER_RECIPE
+from sainet.models.card import IDENTIFIED, Card, Identified
 from sainet.models.correctors.interaction import InteractionNetwork, Scales
 from sainet.models.dynamics import (
     AbstractDynamics,
@@ -23,14 +24,28 @@ from sainet.models.dynamics import (
     SimulatorAugmented,
 )
 from sainet.models.features import feature_set
+from sainet.models.identity import ModelId
 from sainet.models.integrators import Acceleration, RelaxingResidual
 from sainet.runs.documents import write_document
+from sainet.runs.manifest import manifest
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, Trajectory
 
 PUSHES = 4
 STEPS = 24
+CARD = Card(
+    identity=ModelId(kind="in"),
+    kind="robot",
+    time_step=TIME_STEP,
+    truth_engine="planar",
+    data="",
+    disks=2,
+    trained_pushes=4500,
+    weights="",
+    recipe=PAPER_RECIPE.settings(),
+    manifest=manifest(),
+)
 
 
 @lru_cache

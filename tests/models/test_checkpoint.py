@@ -6,10 +6,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 
+from models.samples import CARD as SAMPLE
 from models.samples import network
 from sainet.engines.simulator import PAPER, PlanarSpec
-from sainet.models.card import CARD, WEIGHTS, Card, read_card
+from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.dynamics import LearnedDynamics, PhysicsDynamics, SimulatorAugmented
 from sainet.models.identity import ModelId
@@ -22,18 +24,13 @@ from sainet.scenes.scene import TIME_STEP
 def write_network(folder, model="sain", kind="robot", seed=0):
     """A trained network's folder, as the training leaves it."""
     data = save_arrays(folder / WEIGHTS, network(model, kind, seed))
-    card = Card(
-        identity=ModelId(
-            kind=model, simulator=PlanarSpec() if model == "sain" else None
-        ),
+    simulator = PlanarSpec() if model == "sain" else None
+    card = structs.replace(
+        SAMPLE,
+        identity=ModelId(kind=model, simulator=simulator),
         kind=kind,
-        time_step=TIME_STEP,
-        truth_engine="planar",
-        data="0" * 64,
         data_seeds=(0,),
         weights=content_hash(data),
-        config={},
-        manifest={},
     )
     write_document(folder / CARD, card)
     return folder
@@ -122,14 +119,17 @@ def test_a_damaged_weights_file_is_named(folder, name, harm):
 
 
 BAD_FIELDS = {
-    "format_version": [1, 3, "2", None, 1.5],
+    "format_version": [1, 2, 4, "3", None, 1.5],
     "kind": ["lab", None, ["robot"], "direct-force"],
     "time_step": ["0.004", None, 0, 1, 0.0, -0.1, 2.0, True, [0.004]],
     "weights": ["0" * 64, None],
     "started_from": [3],
     "data_seeds": [3, None, ["0"], [0.5], [True]],
-    "residual": ["yes", None, 1],
-    "config": [None, []],
+    "integrator": ["yes", None, True],
+    "disks": [0, None, 1.5],
+    "trained_pushes": [0, "many", None],
+    "recipe": [None, [], {}],
+    "manifest": [None, [], {}],
 }
 
 

@@ -28,7 +28,7 @@ def test_shipped_networks_are_loaded_by_name(name):
     model = load_model(name)
     assert (model.name, model.card.identity.kind) == (name, name)
     assert (model.card.kind, model.card.truth_engine) == ("robot", "bullet")
-    assert model.card.config["iterations"] == 10_000
+    assert model.card.recipe.iterations == 10_000
     model.check_fits("robot", TIME_STEP, seed=1)
 
 

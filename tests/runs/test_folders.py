@@ -20,6 +20,7 @@ from sainet.runs.documents import (
     to_json,
     write_bytes,
     write_error,
+    write_document,
     write_json,
 )
 from sainet.runs.errors import BadInput, BadStore, RunConflict
@@ -197,7 +198,7 @@ def test_files_are_regular_and_small_enough(tmp_path):
 
 def test_a_run_killed_as_it_began_goes_on(tmp_path):
     (tmp_path / ".config.json.0.partial").write_text("{")
-    write_json(tmp_path / "manifest.json", manifest())
+    write_document(tmp_path / "manifest.json", manifest())
     open_here(tmp_path)
     assert files(tmp_path).keys() == {"config.json", "manifest.json"}
 

@@ -1,10 +1,11 @@
 """The learning curve shows a training, not where it was written."""
 
+from sainet.learning.log import LogLine
 from sainet.studies.curves import draw_history
 
 LOG = [
-    {"iteration": 5, "loss": 2.0},
-    {"iteration": 10, "loss": 1.0, "validation_loss": 1.2},
+    LogLine(5, 2.0),
+    LogLine(10, 1.0, 1.2),
 ]
 
 

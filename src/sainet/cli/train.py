@@ -8,7 +8,8 @@ from tyro.conf import AvoidSubcommands, Positional
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
-from sainet.learning.recipes import PAPER, ModelKind, Recipe, SingleSteps
+from sainet.learning.recipes import PAPER, Recipe, SingleSteps
+from sainet.models.identity import ModelKind
 from sainet.runs.errors import BadInput
 
 
@@ -115,5 +116,4 @@ class Job:
             self.model, result.history, self.out / "learning-curve.svg"
         )
         output.say(f"{name} is in {self.out}, its learning curve in {curve}")
-        loss = result.history[-1]["loss"] if result.history else None
-        return {"out": str(self.out), "model": self.model, "loss": loss}
+        return {"out": str(self.out), "model": self.model, "loss": result.loss}

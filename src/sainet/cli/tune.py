@@ -10,11 +10,10 @@ from sainet.cli.train import Job
 from sainet.learning.recipes import (
     FROM_ENGINE,
     RESIDUAL,
-    Features,
-    ModelKind,
     recipe_for,
     start_named,
 )
+from sainet.models.identity import Features, ModelKind
 
 
 @dataclass(frozen=True, kw_only=True)

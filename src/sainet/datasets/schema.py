@@ -26,7 +26,6 @@ from sainet.worlds.config import SetupName
 Arrays = dict[str, np.ndarray]  # of some pushes, by the names of variables
 
 FORMAT_VERSION = 2
-RECORDED = "recorded"  # instead of the engine that made the ground truth
 ARRAYS = "pushes.zarr"  # folder of the arrays
 HASHES = "hashes.json"
 Hashes = dict[str, str]  # SHA-256 by file, relative to the folder of the arrays

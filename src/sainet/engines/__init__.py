@@ -7,6 +7,7 @@ from sainet.runs.names import load_named
 if TYPE_CHECKING:
     from sainet.engines.base import AbstractEngine
 
+RECORDED = "recorded"  # in the place of an engine: pushes of a physical robot
 ENGINES = {
     "bullet": "sainet.engines.bullet.engine:BulletEngine",
     "planar": "sainet.engines.planar.engine:PlanarEngine",

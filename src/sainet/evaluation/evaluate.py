@@ -294,9 +294,9 @@ def _training(model: Model) -> TrainingRun:
     card = model.card
     return TrainingRun(
         model=model.name,
-        seed=card.config.get("seed"),
+        seed=card.recipe.seed,
         weights=card.weights,
         data=card.data,
-        iterations=card.config.get("iterations"),
+        iterations=card.recipe.iterations,
         final_loss=card.final_loss,
     )

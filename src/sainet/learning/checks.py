@@ -54,7 +54,7 @@ def _check_existing(task: Task, existing: Existing) -> None:
     pairs = {
         "kind": (card.kind, info.kind),
         "time_step": (card.time_step, info.time_step),
-        "recurrent": (card.recurrent, not task.has_single_steps),
+        "recipe.horizon": (card.recipe.horizon, task.recipe.horizon.kind),
         "identity.kind": (card.identity.kind, task.model),
     }
     for name, (found, wanted) in pairs.items():

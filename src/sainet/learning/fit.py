@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import jax
 import numpy as np
@@ -15,9 +14,14 @@ from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
 from sainet.learning.checks import check_task
-from sainet.learning.log import append_log, read_log, rewind_log
+from sainet.learning.log import LogLine, append_log, read_log, rewind_log
 from sainet.learning.loss import LossWeights
-from sainet.learning.recipes import FROM_ENGINE, FromModel, ModelKind, Recipe, Start
+from sainet.learning.recipes import (
+    FROM_ENGINE,
+    FromModel,
+    Recipe,
+    Start,
+)
 from sainet.learning.step import (
     Best,
     FitState,
@@ -30,15 +34,15 @@ from sainet.learning.task import Existing, Task, begin, settings
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.correctors.interaction import InteractionNetwork
-from sainet.models.identity import ModelId, TrainingData
+from sainet.models.identity import ModelId, ModelKind, TrainingData
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
 from sainet.runs.digests import digests_from_text, digests_to_text
-from sainet.runs.documents import content_hash, read_json, write_document
+from sainet.runs.documents import content_hash, read_document, write_document
 from sainet.runs.errors import Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.interrupts import raise_if_interrupted
-from sainet.runs.manifest import MANIFEST, manifest
+from sainet.runs.manifest import MANIFEST, Manifest, manifest
 from sainet.scenes.camera import AGREES
 
 STATE = "state.safetensors"
@@ -52,7 +56,12 @@ class FitResult:
     """A trained network's folder and the log of its training."""
 
     folder: Path
-    history: list[dict[str, Any]]
+    history: tuple[LogLine, ...]
+
+    @property
+    def loss(self) -> float | None:
+        """The last logged loss of training; None without iterations."""
+        return self.history[-1].loss if self.history else None
 
 
 def fit(
@@ -104,11 +113,11 @@ def fit(
     history = rewind_log(out, int(state.iteration))
     # Match the step's output device: otherwise its second call compiles again.
     state = jax.device_put(state, jax.devices()[0])
-    progress = Progress(state, best, history)
+    progress = Progress(state, best, list(history))
     step = make_step(recipe, weights, drawn_to)
     _iterate(task, progress, step, validate, out=out, on_step=on_step)
     _finish(task, progress, folder)
-    return FitResult(out, history)
+    return FitResult(out, tuple(progress.history))
 
 
 def _existing(start: Start) -> Existing | None:
@@ -126,15 +135,19 @@ def _existing(start: Start) -> Existing | None:
 
 
 def _warn_of_other_machine(folder: RunFolder, devices: int) -> None:
-    before, now = read_json(folder.path / MANIFEST), manifest(devices)
-    known = before.get("versions")
-    if isinstance(known, dict):  # manifests once named fewer packages
-        now["versions"] = {k: v for k, v in now["versions"].items() if k in known}
-    for name in ("versions", "processor", "devices"):
-        if before.get(name) != now[name]:
+    before, now = read_document(folder.path / MANIFEST, Manifest), manifest(devices)
+    # Manifests once named fewer packages.
+    versions = {name: now.versions.get(name) for name in before.versions}
+    pairs = {
+        "versions": (before.versions, versions),
+        "processor": (before.processor, now.processor),
+        "devices": (before.devices, now.devices),
+    }
+    for name, (known, found) in pairs.items():
+        if known != found:
             warnings.warn(
-                f"{folder.path}: {name} was {before.get(name)} when training began and "
-                f"is {now[name]} now; the weights will differ in their last bits.",
+                f"{folder.path}: {name} was {known} when training began and is {found} "
+                "now; the weights will differ in their last bits.",
                 stacklevel=3,
             )
 
@@ -145,7 +158,7 @@ class Progress:
 
     state: FitState
     best: Best | None  # None without validation pushes
-    history: list[dict[str, Any]]
+    history: list[LogLine]
 
     @property
     def network(self) -> InteractionNetwork:
@@ -177,7 +190,7 @@ def _iterate(
                 _log_line(progress, iteration, float(loss), validate, out)
             if iteration % recipe.checkpoint_every == 0 or last:
                 save_arrays(out / STATE, (progress.state, progress.best))
-            on_step(iteration, history[-1]["loss"] if history else None)
+            on_step(iteration, history[-1].loss if history else None)
             patience = recipe.stopping.patience
             if progress.best and progress.best.is_stale(iteration, patience):
                 break
@@ -192,24 +205,19 @@ def _log_line(
     validate: Validate | None,
     out: Path,
 ) -> None:
-    line = {"iteration": iteration, "loss": loss}
+    if not np.isfinite(loss):
+        raise Diverged(
+            f"{out}: the loss is {loss} at iteration {iteration}; lower "
+            "`learning_rate` or `clip_norm`."
+        )
+    checked = None
     if validate is not None and progress.best is not None:
         network = progress.state.result
-        line["validation_loss"] = validate(network)
-        progress.best = progress.best.or_better(
-            network, line["validation_loss"], iteration
-        )
-    _check_finite(line, out)
+        checked = validate(network)
+        progress.best = progress.best.or_better(network, checked, iteration)
+    line = LogLine(iteration, loss, checked)
     append_log(out, line)
     progress.history.append(line)
-
-
-def _check_finite(line: dict[str, Any], out: Path) -> None:
-    if not np.isfinite(line["loss"]):
-        raise Diverged(
-            f"{out}: the loss is {line['loss']} at iteration {line['iteration']}; "
-            "lower `learning_rate` or `clip_norm`."
-        )
 
 
 def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
@@ -227,23 +235,25 @@ def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
 def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
     info, sain, history = task.store.info, task.model == "sain", progress.history
     data = save_arrays(folder.path / WEIGHTS, progress.network)
+    is_additive = isinstance(progress.network.integrator, RelaxingResidual)
     start = task.existing.card if task.existing else None
     card = Card(
         identity=_identity(task),
         kind=info.kind,
         time_step=info.time_step,
         truth_engine=info.engine,
+        integrator="relaxing-residual" if is_additive else "acceleration",
         camera=task.assumed.camera if sain else AGREES,
         data=task.store.content,
         data_seeds=start.data_seeds if start else (),
+        disks=info.bodies,
+        trained_pushes=info.pushes,
         pushes=_pushes(task.store, start),
         weights=content_hash(data),
         started_from=start.weights if start else None,
-        recurrent=not task.has_single_steps,
-        residual=isinstance(progress.network.integrator, RelaxingResidual),
-        config=task.recipe.settings(),
-        manifest=read_json(folder.path / MANIFEST),
-        final_loss=history[-1]["loss"] if history else None,
+        recipe=task.recipe.settings(),
+        manifest=read_document(folder.path / MANIFEST, Manifest),
+        final_loss=history[-1].loss if history else None,
     )
     write_document(folder.path / CARD, card)
     (folder.path / STATE).unlink(missing_ok=True)

@@ -2,15 +2,26 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
-from sainet.runs.documents import is_number, read_file, write_bytes
+import msgspec
+
+from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
+from sainet.scenes.quantities import Finite
 
 LOG = "log.jsonl"
+_LARGEST = 1 << 30  # bytes
 
 
-def read_log(folder: Path) -> list[dict[str, Any]]:
+class LogLine(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Losses after an iteration, means over pushes and without l2."""
+
+    iteration: int
+    loss: Finite  # of the batch
+    validation_loss: float | None = None  # None without validation pushes
+
+
+def read_log(folder: Path) -> tuple[LogLine, ...]:
     """Return the lines of a log, without a last line that a crash cut.
 
     Raises:
@@ -18,22 +29,20 @@ def read_log(folder: Path) -> list[dict[str, Any]]:
     """
     path = folder / LOG
     if not path.is_file():
-        return []
-    *lines, _ = read_file(path, most=1 << 30, error=BadCheckpoint).split(b"\n")
-    return [_parsed(path, number, line) for number, line in enumerate(lines, 1)]
+        return ()
+    *lines, _ = read_file(path, most=_LARGEST, error=BadCheckpoint).split(b"\n")
+    return tuple(_parsed(path, number, line) for number, line in enumerate(lines, 1))
 
 
-def _parsed(path: Path, number: int, line: bytes) -> dict[str, Any]:
+def _parsed(path: Path, number: int, line: bytes) -> LogLine:
     try:
-        found = json.loads(line)
-        if all(is_number(found[name]) for name in ("iteration", "loss")):
-            return found
-    except (ValueError, TypeError, LookupError, RecursionError):
-        pass
-    raise BadCheckpoint(
-        f"{path}: line {number} is damaged; it must have iteration and loss. Delete "
-        "that line (the network does not depend on it) and run the same command again."
-    )
+        return msgspec.json.decode(line, type=LogLine)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        raise BadCheckpoint(
+            f"{path}: line {number} is damaged; it must have iteration and loss. "
+            "Delete that line (the network does not depend on it) and run the same "
+            "command again."
+        ) from None
 
 
 def loss_note(loss: float | None) -> str:
@@ -41,15 +50,18 @@ def loss_note(loss: float | None) -> str:
     return "" if loss is None else f"loss {loss:.3g}"
 
 
-def rewind_log(folder: Path, iteration: int) -> list[dict[str, Any]]:
+def rewind_log(folder: Path, iteration: int) -> tuple[LogLine, ...]:
     """Return the lines up to a checkpoint's iteration; delete the others."""
-    kept = [line for line in read_log(folder) if line["iteration"] <= iteration]
-    text = "".join(json.dumps(line) + "\n" for line in kept)
-    write_bytes(folder / LOG, text.encode())
+    kept = tuple(line for line in read_log(folder) if line.iteration <= iteration)
+    write_bytes(folder / LOG, "".join(map(_text, kept)).encode())
     return kept
 
 
-def append_log(folder: Path, line: dict[str, Any]) -> None:
+def append_log(folder: Path, line: LogLine) -> None:
     """Add a line."""
     with (folder / LOG).open("a", encoding="utf-8") as file:
-        file.write(json.dumps(line) + "\n")
+        file.write(_text(line))
+
+
+def _text(line: LogLine) -> str:
+    return json.dumps(msgspec.to_builtins(line)) + "\n"

@@ -6,12 +6,14 @@ Free of JAX.
 
 import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
+import msgspec
+
+from sainet.models.card import TrainingSettings
+from sainet.models.identity import Features
 from sainet.runs.errors import require, unknown_name
 
-ModelKind = Literal["in", "sain"]
-Features = Literal["paper", "place"]
 Terms = Literal["motion", "error"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
 
@@ -199,7 +201,7 @@ class Recipe:
         _require_at_least(self, 0, "seed")
         _require_at_least(self, 1, "log_every", "checkpoint_every")
 
-    def changed(self, **settings: Any) -> "Recipe":  # noqa: ANN401
+    def changed(self, **settings: object) -> "Recipe":
         """Return the recipe with other settings, each by its name in any part.
 
         Raises:
@@ -226,13 +228,16 @@ class Recipe:
             for inner in fields(part)
         }
 
-    def settings(self) -> dict[str, Any]:
-        """Return every setting except the start by its name, as JSON values."""
-        flat: dict[str, Any] = {}
-        for name, value in asdict(self).items():
+    def settings(self) -> TrainingSettings:
+        """Return every setting except the start, for documents.
+
+        Raises:
+            BadInput: a setting has a wrong type.
+        """
+        flat: dict[str, object] = {"horizon": self.horizon.kind}
+        for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
-        flat.pop("model", None)  # the start's: a name is no setting, its weights are
-        return flat | {"horizon": self.horizon.kind}
+        return msgspec.convert(flat | {"horizon": self.horizon.kind}, TrainingSettings)
 
 
 PAPER = Recipe()

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import equinox as eqx
 import jax
@@ -20,7 +19,6 @@ from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import (
     FROM_ENGINE,
     FromSimulator,
-    ModelKind,
     Recipe,
     SingleSteps,
 )
@@ -29,6 +27,7 @@ from sainet.models.card import Card
 from sainet.models.checkpoint import untrained
 from sainet.models.correctors.interaction import InteractionNetwork, Scales
 from sainet.models.features import FeatureSet, Place, feature_set
+from sainet.models.identity import ModelKind
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
@@ -150,9 +149,9 @@ class Task:
         )
 
 
-def settings(task: Task) -> dict[str, Any]:
+def settings(task: Task) -> dict[str, object]:
     """Return the settings that decide the weights, as JSON values."""
-    recipe = task.recipe.settings()
+    recipe = msgspec.to_builtins(task.recipe.settings())
     for name in _REPORTING:
         del recipe[name]
     start = {"start": task.existing.card.weights} if task.existing else {}

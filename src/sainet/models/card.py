@@ -1,20 +1,54 @@
 """Documents of models: cards of networks, and identified parameters."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Literal
 
 import msgspec
 
 from sainet.engines.simulator import InternalEngine
-from sainet.models.identity import ModelId
+from sainet.models.identity import NETWORKS, Features, ModelId
 from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadCheckpoint, BadInput
 from sainet.runs.folders import CONFIG, remake
+from sainet.runs.manifest import Manifest
 from sainet.scenes.camera import AGREES, CameraOffset
 from sainet.scenes.quantities import Finite, Size, TimeStep
 
 CARD = "card.json"
 WEIGHTS = "network.safetensors"
+IDENTIFIED = "identified.json"
+Count = Annotated[int, msgspec.Meta(ge=1)]
+
+
+class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """The settings of a recipe; its start is not one of them.
+
+    Each has the name and the meaning of the field in `learning.recipes`.
+    """
+
+    iterations: int
+    batch_size: int
+    learning_rate: float
+    halve_every: int
+    clip_norm: float
+    average: int
+    l2: float | None
+    weight_position: float
+    weight_rotation: float
+    weight_velocity: float
+    weight_spin: float
+    terms: str
+    linear_from: float
+    horizon: Literal["whole-push", "single-steps"]
+    steps: int
+    hold: int | msgspec.UnsetType = msgspec.UNSET  # single steps have none
+    mirror: bool
+    validation_share: float
+    patience: int
+    features: Features
+    seed: int
+    log_every: int
+    checkpoint_every: int
 
 
 class Card(msgspec.Struct, frozen=True, kw_only=True):
@@ -23,29 +57,38 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     identity: ModelId
     kind: Literal["robot", "direct-force"]  # setup of the pushes
     time_step: TimeStep  # s
-    truth_engine: str  # that made the training data, or "recorded"
+    truth_engine: str  # that made the training data, or `RECORDED`
+    integrator: Literal["acceleration", "relaxing-residual"] = "acceleration"
     camera: CameraOffset = AGREES  # of the internal engine
     data: str  # hash of the training data
+    disks: Count  # in each push of the training data
+    trained_pushes: Count  # number of pushes in the training data
     data_seeds: tuple[int, ...] = ()  # of simulated training pushes not in `pushes`
     pushes: str = ""  # training pushes (`runs.digests`)
     weights: str  # hash of the weights' file
     started_from: str | None = None  # hash of the weights that training began with
-    recurrent: bool = True  # False: trained on single steps
-    residual: bool = False  # True: adds to the internal engine's acceleration
-    config: dict[str, Any]  # training settings
-    manifest: dict[str, Any]  # versions, hardware, number of devices
+    recipe: TrainingSettings
+    manifest: Manifest
     final_loss: float | None = None
-    format_version: Literal[2] = 2
+    format_version: Literal[3] = 3
 
     def __post_init__(self) -> None:
         """Refuse identities that no network can have."""
         kind, simulator = self.identity.kind, self.identity.simulator
-        if kind not in ("in", "sain"):
-            raise ValueError(f"identity.kind is {kind!r}; it must be 'in' or 'sain'")
+        if kind not in NETWORKS:
+            known = " or ".join(map(repr, NETWORKS))
+            raise ValueError(f"identity.kind is {kind!r}; it must be {known}")
         if (simulator is None) != (kind == "in"):
             raise ValueError("identity.simulator is missing, or there is one for 'in'")
-        if self.residual and kind != "sain":
-            raise ValueError("residual is true; identity.kind must then be 'sain'")
+        if simulator is None and self.integrator != "acceleration":
+            raise ValueError(
+                f"integrator is {self.integrator!r}; identity.kind must then be 'sain'"
+            )
+
+    @property
+    def has_single_steps(self) -> bool:
+        """Whether the network was trained on single steps (the paper's figure 2c)."""
+        return self.recipe.horizon == "single-steps"
 
     @property
     def internal(self) -> InternalEngine | None:
@@ -71,7 +114,6 @@ def read_card(folder: Path) -> Card:
     return read_document(path, Card, error=BadCheckpoint, remedy="train it again")
 
 
-IDENTIFIED = "identified.json"
 _INTERNAL = ("engine", "format_version")
 
 
@@ -98,7 +140,7 @@ class Identified(msgspec.Struct, frozen=True, kw_only=True):
     after_deg: Size
     format_version: Literal[2] = 2
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Return the estimates as JSON values, sorted by name."""
         found = msgspec.to_builtins(self, order="sorted") | {"values": self.values}
         return {name: found[name] for name in sorted(found) if name not in _INTERNAL}

@@ -83,7 +83,8 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
     augmented = card.identity.kind == "sain"
     place = card.identity.features == "place"
     features = feature_set(card.kind, simulator=augmented, place=place)
-    integrator = RelaxingResidual() if card.residual else Acceleration()
+    additive = card.integrator == "relaxing-residual"
+    integrator = RelaxingResidual() if additive else Acceleration()
     network = untrained(features, card.time_step, integrator)
     loaded = load_arrays(folder / WEIGHTS, network)
     if content_hash(read_file(folder / WEIGHTS, error=BadCheckpoint)) != card.weights:

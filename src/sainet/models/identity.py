@@ -21,9 +21,11 @@ Kind = Literal["physics", "in", "sain", "gp", "published"]
 # "simulation" is a stroke network used as it is, "tuned" one fine-tuned on recorded
 # pushes; "residual" an additive network and "real" a new one, recorded pushes only.
 TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
+ModelKind = Literal["in", "sain"]  # of networks
 Features = Literal["paper", "place"]
 Variant = Literal["", "bystander", "single-steps", "for-all"]
 
+NETWORKS = get_args(ModelKind)
 _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
 _VARIANTS = {"single-steps": "single steps", "for-all": "all surfaces"}
 

@@ -141,7 +141,7 @@ def load_model(name: str, *, engine: str | None = None, force: bool = False) -> 
         simulator = _internal(folder, card, card.identity.simulator, engine, force)
         internal = InternalEngine(simulator, card.camera)
         dynamics = SimulatorAugmented(network, simulator.build())
-    if not card.recurrent:
+    if card.has_single_steps:
         dynamics, internal = _restarted(folder, dynamics), None
     dynamics = with_camera(dynamics, card.camera)
     identity = named(card.identity, folder)
@@ -215,8 +215,8 @@ def _internal(
 def _restarted(folder: Path, dynamics: AbstractDynamics) -> AbstractDynamics:
     if dynamics.on_host:
         raise BadCheckpoint(
-            f"{folder / CARD}: recurrent is false, and the engine cannot restart at "
-            "every step; give `engine` planar, or train it on whole pushes."
+            f"{folder / CARD}: recipe.horizon is single-steps, and the engine cannot "
+            "restart at every step; give `engine` planar, or train it on whole pushes."
         )
     return Restarted(dynamics)
 

@@ -14,6 +14,7 @@ from sainet.runs.documents import (
     readable,
     to_json,
     write_error,
+    write_document,
     write_json,
 )
 from sainet.runs.errors import RunConflict, shown
@@ -112,7 +113,7 @@ def open_run(
         if not leftover.is_dir():
             leftover.unlink(missing_ok=True)
     if not (path / MANIFEST).exists():
-        write_json(path / MANIFEST, manifest(devices))
+        write_document(path / MANIFEST, manifest(devices))
     if not (path / CONFIG).exists():
         write_json(path / CONFIG, wanted)
     return folder

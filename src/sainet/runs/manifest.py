@@ -6,7 +6,6 @@ import subprocess
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -30,13 +29,13 @@ class Manifest(msgspec.Struct, frozen=True, kw_only=True):
     format_version: int = 2
 
 
-def manifest(devices: int = 0) -> dict[str, Any]:
-    """Return the manifest of a run as JSON values.
+def manifest(devices: int = 0) -> Manifest:
+    """Return the manifest of a run on this machine.
 
     Args:
         devices: of JAX, where the result depends on their number.
     """
-    found = Manifest(
+    return Manifest(
         versions={name: _version(name) for name in _PACKAGES},
         git_commit=_git_commit(),
         python=platform.python_version(),
@@ -45,7 +44,6 @@ def manifest(devices: int = 0) -> dict[str, Any]:
         cores=os.cpu_count(),
         devices=devices,
     )
-    return msgspec.to_builtins(found)
 
 
 def _version(name: str) -> str | None:

@@ -12,7 +12,6 @@ from sainet.datasets.batch import simulate
 from sainet.datasets.recorded.properties import Properties
 from sainet.datasets.recorded.resample import ResampledPush
 from sainet.datasets.schema import (
-    RECORDED,
     Arrays,
     StoreInfo,
     published_name,
@@ -20,6 +19,7 @@ from sainet.datasets.schema import (
 )
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import write_once
+from sainet.engines import RECORDED
 from sainet.engines.simulator import simulator_named, stored_simulator
 from sainet.scenes.recording import Conditions
 from sainet.scenes.scene import TIME_STEP
