@@ -225,8 +225,10 @@ def test_a_network_that_cannot_be_is_refused(folder, identity, says):
 
 
 def test_an_additive_network_needs_an_internal_engine(folder):
-    edit_card(folder, identity={"kind": "in"}, residual=True)
-    with pytest.raises(BadCheckpoint, match="residual is true"):
+    edit_card(folder, identity={"kind": "in"}, integrator="relaxing-residual")
+    with pytest.raises(
+        BadCheckpoint, match="integrator is 'relaxing-residual'.*must then be 'sain'"
+    ):
         read_card(folder)
 
 

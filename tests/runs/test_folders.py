@@ -256,10 +256,10 @@ def test_manifests_depend_on_neither_time_nor_folder(tmp_path, monkeypatch):
     monkeypatch.setattr("time.time", lambda: 0.0)
     monkeypatch.chdir(tmp_path)
     assert manifest(2) == first
-    assert first["devices"] == 2
-    assert first["format_version"] == 2
-    assert first["versions"]["jax"]
-    assert first["versions"]["scipy"]
-    assert "pybullet" in first["versions"]  # None where it is not installed
-    assert not re.search(r"20\d\d-\d\d|\d\d:\d\d", json.dumps(first))
-    assert os.uname().nodename not in json.dumps(first)
+    assert first.devices == 2
+    assert first.format_version == 2
+    assert first.versions["jax"]
+    assert first.versions["scipy"]
+    assert "pybullet" in first.versions  # None where it is not installed
+    assert not re.search(r"20\d\d-\d\d|\d\d:\d\d", str(first))
+    assert os.uname().nodename not in str(first)

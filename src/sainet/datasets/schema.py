@@ -6,6 +6,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
+from sainet.engines import RECORDED
 from sainet.scenes.quantities import (
     ANGLE,
     DAMPING,
