@@ -4,9 +4,10 @@ import msgspec
 import numpy as np
 
 from sainet.control.record import EpisodeRecord
+from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Comparison, Estimate, Factor, Row, Summary
-from sainet.models.identity import identity_named
+from sainet.models.identity import ModelId
 from sainet.report.replay import Replay, Track
 
 STEPS = 200
@@ -101,6 +102,25 @@ def compared(model, against, difference=-0.162, metric="pos_mm"):
     return Comparison(**names, body=1, metric=metric, difference=found)
 
 
+IDENTITIES = {
+    each.slug: each
+    for each in (
+        ModelId(kind="physics", simulator=SIMULATORS["planar"]),
+        ModelId(kind="physics", simulator=SIMULATORS["planar-true"]),
+        ModelId(kind="in"),
+        *(
+            ModelId(kind="sain", simulator=SIMULATORS[name])
+            for name in ("planar", "planar-true", "bullet")
+        ),
+    )
+}
+
+
+def identity(name):
+    """Return the identity of a usual model; of another, one with this name."""
+    return IDENTITIES.get(name) or ModelId(kind="published", name=name)
+
+
 def factor(model, error, baseline=3.6):
     ratio = baseline / error
     estimate = Estimate(ratio, 0.9 * ratio, 1.1 * ratio)
@@ -121,7 +141,7 @@ def summary(rows, **parts):
     models = dict.fromkeys(row.model for row in rows)
     conditions = dict.fromkeys(row.condition for row in rows)
     return Summary(
-        models=tuple(map(identity_named, models)),
+        models=tuple(map(identity, models)),
         conditions=tuple(Condition(label=label) for label in conditions),
         rows=tuple(rows),
         **parts,
@@ -138,9 +158,7 @@ def result():
     ]
     paper = {"physics": (6.27, 5.81), "in": (5.76, 3.84), "sain": (4.66, 3.47)}
     published = tuple(
-        PublishedValues(
-            condition="", model=identity_named(model), values={"pos_mm": pair}
-        )
+        PublishedValues(condition="", model=identity(model), values={"pos_mm": pair})
         for model, pair in paper.items()
     )
     return summary(

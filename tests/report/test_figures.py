@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from report import samples
+from sainet.engines.simulator import SIMULATORS
+from sainet.models.identity import ModelId
 from sainet.report.figures.canvas import spread
 from sainet.report.figures.learning import draw_learning_curve, running_mean
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
@@ -119,12 +121,12 @@ def test_unknown_models_get_colours_of_their_own():
     assert len(style_of("runs/" + 60 * "x").label) <= 40
 
 
-def test_other_forms_of_a_network_extend_its_label():
-    label = style_of("sain-bullet-bystander").label
-    assert label == "SAIN around Bullet, bystander"
-    assert style_of("in-single-steps").label == "IN, single steps"
-    for unknown in ("runs/in-bystander", "in-bystanders", "-bystander"):
-        assert style_of(unknown).label == unknown
+def test_a_model_without_a_colour_of_its_own_keeps_its_label():
+    bullet = SIMULATORS["bullet"]
+    known = ModelId(kind="sain", simulator=bullet, variant="bystander")
+    styles = styles_of([known.slug, "runs/in-bystander"], [known])
+    labels = [style.label for style in styles.values()]
+    assert labels == ["SAIN around Bullet, bystander", "runs/in-bystander"]
 
 
 def test_lines_differ_without_their_colours():

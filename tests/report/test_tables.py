@@ -12,7 +12,6 @@ from rich.console import Console
 from report import samples
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
-from sainet.models.identity import identity_named
 from sainet.report.arrange import arrange
 from sainet.report.writers import print_table, to_csv, to_html, to_latex, to_markdown
 
@@ -204,7 +203,7 @@ def test_hostile_names_stay_text():
     result = msgspec.structs.replace(
         result,
         rows=(*result.rows, samples.row(HOSTILE, 1, 0.3, group=HOSTILE)),
-        models=(*result.models, identity_named(HOSTILE)),
+        models=(*result.models, samples.identity(HOSTILE)),
         conditions=(*result.conditions, Condition(label=HOSTILE)),
     )
     cells = parse(result)

@@ -7,7 +7,7 @@ from sainet.evaluation.claims import PUBLISHED_ORDER
 from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
-from sainet.models.identity import ModelId, identity_named
+from sainet.models.identity import ModelId
 from sainet.report.verdicts import beside_published, verdicts_on
 
 MODELS = {"physics": 16, "in": 2, "sain": 7}
@@ -82,7 +82,7 @@ def tables(pairs, models=("physics", "in", "sain-bullet")):
     ]
     published = tuple(
         PublishedValues(
-            condition="", model=identity_named(model), values={"pos_mm": means}
+            condition="", model=samples.identity(model), values={"pos_mm": means}
         )
         for model, means in PAPER.items()
     )

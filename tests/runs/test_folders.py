@@ -1,7 +1,6 @@
 """Run folders: atomic writes, settings that must agree, manifests without dates."""
 
 import errno
-import json
 import os
 import re
 import subprocess
@@ -19,8 +18,8 @@ from sainet.runs.documents import (
     read_json,
     to_json,
     write_bytes,
-    write_error,
     write_document,
+    write_error,
     write_json,
 )
 from sainet.runs.errors import BadInput, BadStore, RunConflict

@@ -3,6 +3,7 @@
 from importlib.util import find_spec
 
 import pytest
+from msgspec.structs import asdict
 
 from sainet.learning.recipes import PAPER
 from sainet.models.card import CARD
@@ -17,7 +18,7 @@ from sainet.runs.documents import read_json
 from support import require
 
 SAME = ("identity", "kind", "time_step", "truth_engine", "camera")
-SAME += ("recurrent", "residual", "format_version")
+SAME += ("integrator", "disks", "format_version")
 SMALLER = ("iterations", "batch_size")
 
 
@@ -35,11 +36,11 @@ def test_small_networks_have_the_cards_of_shipped_networks(make, tmp_path):
         assert made.keys() == shipped.keys()
         assert made["manifest"].keys() == shipped["manifest"].keys()
         assert {n: made[n] for n in SAME} == {n: shipped[n] for n in SAME}
-        assert shipped["config"].keys() == PAPER.settings().keys()
+        assert shipped["recipe"].keys() == asdict(PAPER.settings()).keys()
         recipes = [
-            {k: v for k, v in card["config"].items() if k not in SMALLER}
+            {k: v for k, v in card["recipe"].items() if k not in SMALLER}
             for card in (made, shipped)
         ]
         assert recipes[0] == recipes[1]
-        assert shipped["config"]["iterations"] == iterations[name]
+        assert shipped["recipe"]["iterations"] == iterations[name]
         load_model(str(into / name)).check_fits("robot", 1 / 240, seed=1)

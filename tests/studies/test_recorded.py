@@ -106,7 +106,7 @@ def test_no_push_is_predicted_by_a_network_trained_on_it(tuned, tmp_path):
     counts |= {f"{subject}-for-all-seed-0": 2}
     assert {name: len(found) for name, found in cards.items()} == counts
     for added in cards[f"{subject}-seed-0"]:
-        assert (added.started_from, added.residual) == (None, True)
+        assert (added.started_from, added.integrator) == (None, "relaxing-residual")
         assert added.internal.simulator.is_identified
         assert added.identity.features == "paper"
     tuned_cards = cards["sain-tuned-place-seed-0"]
@@ -148,7 +148,7 @@ def test_settings_of_tuning_are_compared_over_robots(make, monkeypatch, tmp_path
         assert choice["score"] == pytest.approx(np.mean([*scores.values()]))
         assert choice["scores"] == pytest.approx(scores)
     decided = {
-        read_card(path.parent).config["l2"]
+        read_card(path.parent).recipe.l2
         for path in (tmp_path / STEPS).rglob("card.json")
     }
     assert decided == {1 / 20, 1 / 10}  # one over the pushes

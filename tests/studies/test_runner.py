@@ -138,11 +138,11 @@ def test_parallel_training_gives_the_same_networks(store, tmp_path):
     assert told["Training 4 networks"] == (80, 80, True)
     for each in step.networks:
         card = read_card(at_once.folder(each))
-        known = card.identity.kind, card.config["seed"]
+        known = card.identity.kind, card.recipe.seed
         assert known == (each.id.kind, each.recipe.seed)
         one, two = (read_log(run.folder(each)) for run in (alone, at_once))
-        assert [line["iteration"] for line in two] == [5, 10, 15, 20]
-        losses = [[line["loss"] for line in lines] for lines in (one, two)]
+        assert [line.iteration for line in two] == [5, 10, 15, 20]
+        losses = [[line.loss for line in lines] for lines in (one, two)]
         np.testing.assert_allclose(*losses, rtol=1e-3)
     # Finished and single training runs need no process.
     again, told = runner_of(at_once.out, Broken())

@@ -1,18 +1,12 @@
 """Model identities: what a model is, from which its name and its label are computed."""
 
-from collections.abc import Iterator
-from functools import cache
-from itertools import product
 from typing import Literal, get_args
 
 import msgspec
 
 from sainet.engines.simulator import (
     PAPER,
-    SIMULATORS,
     TRUE_PROPERTIES,
-    Assumptions,
-    PlanarSpec,
     SimulatorSpec,
 )
 
@@ -88,26 +82,3 @@ _SIMULATOR_PARTS = {
     "identified": ", identified",
     "bullet": " around Bullet",
 }
-
-
-def identity_named(slug: str) -> ModelId:
-    """Return the identity with this slug; of an unknown slug, one with this name."""
-    return _known().get(slug) or ModelId(kind="published", name=slug)
-
-
-@cache
-def _known() -> dict[str, ModelId]:
-    """Return every identity that the package makes, the usual ones first."""
-    return {identity.slug: identity for identity in reversed([*_identities()])}
-
-
-def _identities() -> Iterator[ModelId]:
-    identified = PlanarSpec(assumptions=Assumptions(table_friction=0.15, mass=(1.0,)))
-    simulators = [*SIMULATORS.values(), identified]
-    yield from (ModelId(kind="physics", simulator=each) for each in simulators)
-    forms = product(*map(get_args, (TrainingData, Features, Variant)))
-    for data, features, variant in forms:
-        form = {"data": data, "features": features, "variant": variant}
-        yield ModelId(kind="in", **form)
-        for simulator in simulators:
-            yield ModelId(kind="sain", simulator=simulator, **form)

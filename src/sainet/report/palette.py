@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from sainet.models.identity import ModelId, identity_named
+from sainet.models.identity import ModelId
 
 INK = "#2f3437"  # text, axes and the truth
 PAPER = "#ffffff"
@@ -68,18 +68,27 @@ _SPARE = (
 )
 
 
-def styles_of(names: Iterable[str]) -> dict[str, ModelStyle]:
+def styles_of(
+    names: Iterable[str], models: Iterable[ModelId] = ()
+) -> dict[str, ModelStyle]:
     """Return the style of each name, in order.
 
     A model without a style of its own gets a spare colour and its dash, chosen by
     its name, or the next free ones if another model here has them already.
+
+    Args:
+        names: slugs of models.
+        models: give the labels of names that the palette lacks; the label of any other
+            name is the name.
     """
     styles: dict[str, ModelStyle] = {}
+    labels = labels_of(models)
     taken: set[int] = set()
     for name in names:
         if name in styles:
             continue
-        styles[name] = _KNOWN.get(name) or _spare_style(name, taken)
+        label = labels.get(name, _shortened(name))
+        styles[name] = _KNOWN.get(name) or _spare_style(name, label, taken)
     return styles
 
 
@@ -98,17 +107,13 @@ def css_variables(*, dark: bool) -> dict[str, str]:
     return {"--ink": ink, "--paper": paper, **disks, **variables}
 
 
-def _spare_style(name: str, taken: set[int]) -> ModelStyle:
+def _spare_style(name: str, label: str, taken: set[int]) -> ModelStyle:
     slot = zlib.crc32(name.encode()) % len(_SPARE)
     while slot in taken and len(taken) < len(_SPARE):
         slot = (slot + 1) % len(_SPARE)
     taken.add(slot)
     color, dark, dash = _SPARE[slot]
-    return ModelStyle(name, _spare_label(name), color, dark, dash)
-
-
-def _spare_label(name: str) -> str:
-    return _shortened(identity_named(name).label)
+    return ModelStyle(name, label, color, dark, dash)
 
 
 def labels_of(models: Iterable[ModelId]) -> dict[str, str]:

@@ -13,8 +13,8 @@ from sainet.runs.documents import (
     read_json,
     readable,
     to_json,
-    write_error,
     write_document,
+    write_error,
     write_json,
 )
 from sainet.runs.errors import RunConflict, shown

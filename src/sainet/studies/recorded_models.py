@@ -12,15 +12,13 @@ from sainet.engines.simulator import SIMULATORS, Assumptions, PlanarSpec
 from sainet.learning.recipes import (
     FINE_TUNING,
     RESIDUAL,
-    Features,
     Fresh,
     FromModel,
-    ModelKind,
 )
 from sainet.models.card import read_identified
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
-from sainet.models.identity import ModelId
+from sainet.models.identity import Features, ModelId, ModelKind
 from sainet.models.identity import Variant as Made
 from sainet.models.library import Model, load_model, network_folder
 from sainet.models.wrappers import with_camera

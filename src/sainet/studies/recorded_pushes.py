@@ -18,7 +18,7 @@ from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import EndOffsets, end_offsets
 from sainet.evaluation.joining import add_models, join_folds, without_predictions
 from sainet.evaluation.measurements import Condition, Measurements
-from sainet.learning.recipes import Features, ModelKind
+from sainet.models.identity import Features, ModelKind
 from sainet.models.library import Model
 from sainet.studies.recorded_models import Inside, Learned, Tuner, Variant, surfaces_of
 from sainet.studies.steps import Evaluate, Given, Join, Step, given

@@ -138,6 +138,6 @@ class Runner:
             if future.done():
                 total += step.iterations
             elif lines := read_log(self.folder(step)):
-                total += int(lines[-1]["iteration"])
-                losses.append(f"{lines[-1]['loss']:.3g}")
+                total += lines[-1].iteration
+                losses.append(f"{lines[-1].loss:.3g}")
         return total, f"losses {', '.join(losses)}" if losses else ""

@@ -236,8 +236,7 @@ class Train(Step[Model]):
             result = self.fitting(runner)(
                 on_step=lambda done, loss: bar.reach(done, loss_note(loss))
             )
-            last = result.history[-1]["loss"] if result.history else None
-            bar.reach(self.iterations, loss_note(last))
+            bar.reach(self.iterations, loss_note(result.loss))
         return replace(load_model(str(runner.folder(self))), id=self.id)
 
 

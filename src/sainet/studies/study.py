@@ -187,7 +187,7 @@ def _write(result: Result, scope: Scope, out: Path) -> None:
     made: dict[str, Any] = {"command": "reproduce", "study": out.name}
     content = scope.recorded and open_store(scope.recorded).content
     write_json(out / CONFIG, made | {"recorded": content})
-    write_json(out / MANIFEST, manifest())
+    write_document(out / MANIFEST, manifest())
     write_document(out / TABLE, result)
 
 

@@ -54,7 +54,7 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         if row.condition in sizes
     ]
     end = "final " if any(METRICS[f.metric].is_of_end for f in summary.factors) else ""
-    styles = styles_of(each.row.model for each in rows)
+    styles = styles_of((each.row.model for each in rows), summary.models)
     bodies = sorted({each.row.body for each in rows})
     cases = [(metric, body) for metric in _METRICS for body in bodies]
     down, across = (1, 2) if len(bodies) == 1 else (2, len(bodies))
