@@ -163,5 +163,5 @@ def test_in_needs_no_restarting_engine(around_bullet):
 
 
 def test_single_step_networks_are_refused_around_bullet(trained):
-    with pytest.raises(BadCheckpoint, match="recurrent is false.*`engine` planar"):
+    with pytest.raises(BadCheckpoint, match="recipe.horizon is single-steps.*`engine` planar"):
         load_model(str(trained.folder), engine="bullet", force=True)

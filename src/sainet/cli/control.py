@@ -38,10 +38,13 @@ class Control:
         use_cache()
         from sainet.control.trials import measure_trials, prepare, run_trials
         from sainet.evaluation.trials import trial_rows
+        from sainet.planning.checks import doubts_of_training
         from sainet.report.figures.episodes import draw_episodes
 
         config = self.config
         model, _ = prepare(config)
+        for doubt in doubts_of_training(model.card, config.disks):
+            self.output.warn(f"{config.model}: {doubt}.")
         solved = 0
         bar = progress_bar(f"Pushing ({config.model})", config.trials, self.output)
         with worker_pool(self.workers) as pool, bar as advance:

@@ -41,7 +41,7 @@ class Evaluate:
         from sainet.evaluation.as_json import to_json_object
         from sainet.evaluation.evaluate import evaluate
         from sainet.evaluation.summary import summarise
-        from sainet.models.library import load_model
+        from sainet.models.library import load_model, other_worlds
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table
 
@@ -51,6 +51,8 @@ class Evaluate:
         models = [
             load_model(name, engine=self.engine, force=self.force) for name in names
         ]
+        for warning in other_worlds(models, store.info.engine):
+            self.output.warn(warning)
         total = store.info.pushes * len(models)
         with progress_bar("Predicting", total, self.output) as advance:
             measured = evaluate(

@@ -1,6 +1,6 @@
 """Models by name: physics, a shipped network, or the folder of a trained one."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 from jaxtyping import UInt64
 
+from sainet.engines import RECORDED
 from sainet.engines.simulator import (
     SIMULATORS,
     InternalEngine,
@@ -108,6 +109,30 @@ OF_PAPER = ("in", "sain", "sain-bullet")
 OF_STROKES = ("in-stroke", "sain-stroke")  # of one disk, as recorded on a robot
 SHIPPED = (*OF_PAPER, *OF_STROKES)
 MODELS = (*PHYSICS, *SHIPPED)
+
+
+def other_worlds(models: Iterable[Model], truth_engine: str) -> Iterator[str]:
+    """Yield warnings of networks that were trained on pushes of another world.
+
+    Args:
+        models: those without a network are skipped.
+        truth_engine: engine that made the test pushes, or `RECORDED`.
+    """
+    trained: dict[str, list[str]] = {}
+    for model in models:
+        if model.card and model.card.truth_engine != truth_engine:
+            trained.setdefault(model.card.truth_engine, []).append(model.name)
+    for engine, names in trained.items():
+        yield (
+            f"{', '.join(names)}: trained on {_pushes_of(engine)}, but these are "
+            f"{_pushes_of(truth_engine)}. Expect larger errors; 'sainet tune' adapts a "
+            "network to other pushes."
+        )
+
+
+def _pushes_of(engine: str) -> str:
+    is_recorded = engine == RECORDED
+    return "recorded pushes" if is_recorded else f"pushes simulated by {engine}"
 
 
 def load_model(name: str, *, engine: str | None = None, force: bool = False) -> Model:

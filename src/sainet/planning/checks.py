@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import equinox as eqx
 import numpy as np
 
+from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics
 from sainet.runs.errors import BadCheckpoint, BadScene
 from sainet.scenes.controls import PathControls
@@ -16,6 +17,9 @@ from sainet.scenes.state import State, check_state
 _DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise
 _APART = 5e-3  # m, gap that counts as apart: networks are trained on touching disks
 _SAME_TIME = 1e-9  # s, difference below which time steps are equal
+# With fewer training pushes the errors of networks rise steeply: they double from 150 to
+# 50 simulated pushes (`sainet reproduce data-efficiency`).
+_FEW_PUSHES = 150
 _SLACK = 1e-3  # relative tolerance of the training range
 _compiled_gaps = eqx.filter_jit(pair_gaps)
 
@@ -76,6 +80,27 @@ def doubts(
     for number, push in enumerate(pushes, start=1):
         for name in _beyond_training(push):
             yield f"push {number}: its {name} is outside the training range of networks"
+
+
+def doubts_of_training(card: Card | None, disks: int) -> Iterator[str]:
+    """Yield reasons why plans with a network may fail, from its training data.
+
+    Args:
+        card: of the network; None without one.
+        disks: in the scene to plan in.
+    """
+    if card is None:
+        return
+    if card.trained_pushes < _FEW_PUSHES:
+        yield (
+            f"its network was trained on {card.trained_pushes} pushes; give it at "
+            f"least {_FEW_PUSHES}"
+        )
+    if card.disks != disks:
+        yield (
+            f"its network was trained on pushes of {card.disks} disk(s), this scene "
+            f"has {disks}; train it on such pushes"
+        )
 
 
 def _beyond_training(push: Push) -> list[str]:
