@@ -163,5 +163,6 @@ def test_in_needs_no_restarting_engine(around_bullet):
 
 
 def test_single_step_networks_are_refused_around_bullet(trained):
-    with pytest.raises(BadCheckpoint, match="recipe.horizon is single-steps.*`engine` planar"):
+    says = "recipe.horizon is single-steps.*`engine` planar"
+    with pytest.raises(BadCheckpoint, match=says):
         load_model(str(trained.folder), engine="bullet", force=True)

@@ -17,8 +17,8 @@ from sainet.scenes.state import State, check_state
 _DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise
 _APART = 5e-3  # m, gap that counts as apart: networks are trained on touching disks
 _SAME_TIME = 1e-9  # s, difference below which time steps are equal
-# With fewer training pushes the errors of networks rise steeply: they double from 150 to
-# 50 simulated pushes (`sainet reproduce data-efficiency`).
+# With fewer training pushes the errors of networks rise steeply: they double from 150
+# to 50 simulated pushes (`sainet reproduce data-efficiency`).
 _FEW_PUSHES = 150
 _SLACK = 1e-3  # relative tolerance of the training range
 _compiled_gaps = eqx.filter_jit(pair_gaps)
