@@ -77,11 +77,13 @@ def our_model(published: ModelId, summary: Summary) -> str:
     The internal engine of the paper's SAIN is Bullet. A summary without such a model
     has SAIN around another engine.
     """
-    of_kind = [each for each in summary.models if each.kind == published.kind]
-    around = [e for e in of_kind if e.simulator and e.simulator.engine == "bullet"]
-    if published.kind == "sain" and around:
-        return around[0].slug
-    return published.slug
+    around = [
+        each.slug
+        for each in summary.models
+        if each.simulator is not None and each.simulator.engine == "bullet"
+        if each == replace(published, simulator=each.simulator)
+    ]
+    return around[0] if published.kind == "sain" and around else published.slug
 
 
 def over_published(

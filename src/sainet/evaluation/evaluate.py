@@ -1,7 +1,8 @@
 """Several models on the same stored pushes, side by side."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,9 +18,9 @@ from sainet.evaluation.measurements import (
     Measurements,
     Provenance,
     TestSet,
+    TrainingRun,
     measurements_of,
 )
-from sainet.evaluation.measurements import Training as TrainingRun
 from sainet.evaluation.metrics import (
     MEASURED,
     REFERENCE_DISTANCE,
@@ -70,18 +71,9 @@ def evaluate(
     hashes = store.push_hashes() if trained and not force else None
     for model in () if force else models:
         model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
-    arrays = _read(store)
-    limit = _limit(store, steps)
-    parts = list(_parts_of_one_length(arrays, limit))
-    errors: list[Errors] = []
-    for model in models:
-        poses = _predict_all(model, store, arrays, parts, on_pushes)
-        found = [
-            push_errors(poses[i], *_truth(arrays, part, length))
-            for i, (part, length) in enumerate(parts)
-        ]
-        errors.append(_in_order(found, parts))
-    return _measurements(models, store, arrays, errors, parts)
+    pushes = _Pushes(store, _limit(store, steps))
+    errors = [pushes.errors(_predict_all(m, pushes, on_pushes)) for m in models]
+    return _measurements(models, pushes, errors)
 
 
 @dataclass(frozen=True)
@@ -116,18 +108,14 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
         model: predicts.
         store: of pushes along paths, observed at least at their ends; NaN otherwise.
     """
-    arrays = _read(store)
-    parts = list(_parts_of_one_length(arrays, store.info.steps))
-    poses = _predict_all(model, store, arrays, parts, lambda name, pushes: None)
-    order = np.argsort(np.concatenate([part for part, _ in parts]))
-    missed = np.concatenate(
-        [
-            (final_pose(*truth) - final_pose(pose, truth[1]))[:, 0]
-            for pose, (part, steps) in zip(poses, parts, strict=True)
-            for truth in [_truth(arrays, part, steps)]
-        ]
-    )[order]
-    last = arrays["command_position"][np.arange(len(order)), arrays["steps"] - 1]
+    pushes = _Pushes(store, store.info.steps)
+    arrays, truths = pushes.arrays, pushes.truths()
+    poses = _predict_all(model, pushes, lambda name, count: None)
+    predicted = [
+        final_pose(p, seen) for p, (_, seen) in zip(poses, truths, strict=True)
+    ]
+    missed = (pushes.final - pushes.in_order(predicted))[:, 0]
+    last = arrays["command_position"][np.arange(len(missed)), arrays["steps"] - 1]
     stroke = (last - arrays["initial_pusher"]).astype(np.float64)
     return EndOffsets(
         place=arrays["initial"][:, 0, :2].astype(np.float64),
@@ -137,12 +125,52 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
     )
 
 
-def _read(store: Store) -> dict[str, np.ndarray]:
-    """Return the arrays that every model needs: no prediction, no measured pose."""
-    info = store.info
-    names = [name for name in input_names(info) if name != "measured"]
-    published = map(published_name, info.published)
-    return store.read(slice(None), (*names, "group", *published))
+@dataclass(frozen=True)
+class _Pushes:
+    """Stored pushes in parts of one length: each part is compiled for once."""
+
+    store: Store
+    most: int  # steps to predict
+
+    @cached_property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays that every model needs: no prediction, no measured pose."""
+        info = self.store.info
+        names = [name for name in input_names(info) if name != "measured"]
+        published = map(published_name, info.published)
+        return self.store.read(slice(None), (*names, "group", *published))
+
+    @cached_property
+    def parts(self) -> list[tuple[np.ndarray, int]]:
+        """The indices of the pushes of each length, and the steps to predict."""
+        lengths = np.minimum(self.arrays["steps"], self.most)
+        return [(np.flatnonzero(lengths == n), int(n)) for n in np.unique(lengths)]
+
+    def truths(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the true poses (m, rad) of each part, and where they are known."""
+        pose, observed = self.arrays["truth"], self.arrays["pose_observed"]
+        return [
+            (pose[part, :steps, :, :3].astype(np.float64), observed[part, :steps] > 0)
+            for part, steps in self.parts
+        ]
+
+    def in_order(self, values: Sequence[np.ndarray]) -> np.ndarray:
+        """Return values of all parts in the order of the store."""
+        order = np.argsort(np.concatenate([part for part, _ in self.parts]))
+        return np.concatenate(values)[order]
+
+    @cached_property
+    def final(self) -> Float[np.ndarray, "push body 3"]:
+        """The last observed pose of each push."""
+        return self.in_order([final_pose(*truth) for truth in self.truths()])
+
+    def errors(self, poses: Sequence[np.ndarray]) -> Errors:
+        """Return the errors of the predicted poses of each part."""
+        pairs = zip(poses, self.truths(), strict=True)
+        found = [push_errors(predicted, *truth) for predicted, truth in pairs]
+        return {
+            name: self.in_order([each[name] for each in found]) for name in MEASURED
+        }
 
 
 def _limit(store: Store, steps: int | None) -> int:
@@ -156,42 +184,23 @@ def _limit(store: Store, steps: int | None) -> int:
     return steps or store.info.steps
 
 
-def _parts_of_one_length(
-    arrays: dict[str, np.ndarray], limit: int
-) -> Iterator[tuple[np.ndarray, int]]:
-    """Yield the indices of pushes of one length, and the steps to predict."""
-    lengths = np.minimum(arrays["steps"], limit)
-    for length in np.unique(lengths):
-        yield np.flatnonzero(lengths == length), int(length)
-
-
-def _truth(
-    arrays: dict[str, np.ndarray], part: np.ndarray, steps: int
-) -> tuple[np.ndarray, np.ndarray]:
-    pose = arrays["truth"][part, :steps, :, :3].astype(np.float64)
-    return pose, arrays["pose_observed"][part, :steps] > 0
-
-
 def _predict_all(
-    model: Model,
-    store: Store,
-    arrays: dict[str, np.ndarray],
-    parts: list[tuple[np.ndarray, int]],
-    on_pushes: Callable[[str, int], None],
+    model: Model, pushes: _Pushes, on_pushes: Callable[[str, int], None]
 ) -> list[np.ndarray]:
     """Return the predicted poses of each part, ``[push, time, body, 3]``."""
-    poses, stored = [], None
+    store, arrays = pushes.store, pushes.arrays
+    poses: list[np.ndarray] = []
+    stored = None
     if model.internal and (known := store.prediction(model.internal)).is_stored:
         arrays = arrays | store.read(slice(None), (known.name,))
         stored = model.internal.simulator.stored_as
-    for part, steps in parts:
-        found = []
+    for part, steps in pushes.parts:
+        found: list[np.ndarray] = []
         for start in range(0, len(part), _BATCH):
             rows = part[start : start + _BATCH]
             whole = np.resize(rows, min(_BATCH, len(part)))
-            batch = to_batch(
-                _rows(arrays, whole), store.info, steps=steps, simulated=stored
-            )
+            some = {name: array[whole] for name, array in arrays.items()}
+            batch = to_batch(some, store.info, steps=steps, simulated=stored)
             pose = _predict(model.dynamics, batch)
             found.append(np.asarray(pose, np.float64)[: len(rows)])
             on_pushes(model.name, len(rows))
@@ -213,10 +222,6 @@ def _check_finite(
         )
 
 
-def _rows(arrays: dict[str, np.ndarray], rows: np.ndarray) -> dict[str, np.ndarray]:
-    return {name: array[rows] for name, array in arrays.items()}
-
-
 def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:
     if dynamics.on_host and batch.simulated is None:  # it uses every core by itself
         return _predict_pose(dynamics, batch)
@@ -235,25 +240,10 @@ def _predict_pose(
     return jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
 
 
-def _in_order(errors: list[Errors], parts: list[tuple[np.ndarray, int]]) -> Errors:
-    """Put the errors of all parts back into the order of the store."""
-    order = np.argsort(np.concatenate([part for part, _ in parts]))
-    return {
-        name: np.concatenate([each[name] for each in errors])[order]
-        for name in errors[0]
-    }
-
-
 def _measurements(
-    models: Sequence[Model],
-    store: Store,
-    arrays: dict[str, np.ndarray],
-    errors: list[Errors],
-    parts: list[tuple[np.ndarray, int]],
+    models: Sequence[Model], pushes: _Pushes, errors: list[Errors]
 ) -> Measurements:
-    order = np.argsort(np.concatenate([part for part, _ in parts]))
-    ends = [final_pose(*_truth(arrays, part, steps)) for part, steps in parts]
-    final = np.concatenate(ends)[order]
+    store, arrays, final = pushes.store, pushes.arrays, pushes.final
     errors = errors + [
         final_errors(arrays[published_name(name)].astype(np.float64), final)
         for name in store.info.published

@@ -60,7 +60,7 @@ class PublishedValues(msgspec.Struct, frozen=True, kw_only=True):
     trials: int | None = None  # of control trials
 
 
-class Training(msgspec.Struct, frozen=True, kw_only=True):
+class TrainingRun(msgspec.Struct, frozen=True, kw_only=True):
     """The origin of one training run of a model."""
 
     model: str  # slug
@@ -85,7 +85,7 @@ class Provenance(msgspec.Struct, frozen=True, kw_only=True):
     command: tuple[str, ...] = ()
     note: str = ""  # on their origin, for readers
     tests: tuple[TestSet, ...] = ()
-    trainings: tuple[Training, ...] = ()
+    trainings: tuple[TrainingRun, ...] = ()
     manifest: Manifest | None = None
 
 

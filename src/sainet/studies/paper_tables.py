@@ -7,6 +7,7 @@ Table II has the networks a second time, fine-tuned beside a bystander.
 """
 
 from sainet.datasets.config import GenerateConfig
+from sainet.evaluation.claims import PUBLISHED_ORDER
 from sainet.learning.recipes import PAPER
 from sainet.studies.paper_setup import IN, NETWORKS, SAIN, PaperSetup, physics
 from sainet.studies.published import (
@@ -63,20 +64,24 @@ DIRECT_FORCE_TWO_DISKS = Study(
     "pushes of two disks by a force?",
     plan=lambda scope: _two_disks("direct-force", scope),
     published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
+    claims=(PUBLISHED_ORDER,),
 )
 DIRECT_FORCE_THREE_DISKS = Study(
     question="Table II: do networks trained on two disks predict three?",
     plan=_three_disks,
     published=PUBLISHED_DIRECT_FORCE_THREE_DISKS,
+    claims=(PUBLISHED_ORDER,),
 )
 ROBOT_TWO_DISKS = Study(
     question="Table III: the same as Table I on pushes by a robot?",
     plan=lambda scope: _two_disks("robot", scope),
     published=PUBLISHED_ROBOT_TWO_DISKS,
+    claims=(PUBLISHED_ORDER,),
 )
 ROBOT_PLANAR = Study(
     question="Table III with the planar engine as truth, on the base installation?",
     plan=_planar,
     needs=(),
     published=PUBLISHED_ROBOT_TWO_DISKS,
+    claims=(PUBLISHED_ORDER,),
 )
