@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sainet.datasets.recorded.checks import recording_problems
-from sainet.datasets.recorded.motion import without_symmetry_jumps
 from sainet.datasets.recorded.properties import Properties
+from sainet.datasets.recorded.raw import without_symmetry_jumps
 from sainet.datasets.recorded.resample import (
     SMOOTHING,
     ResampledPush,

@@ -3,7 +3,6 @@
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,7 +32,7 @@ Published = Mapping[str, Float[np.ndarray, "push body 3"]]  # final poses by mod
 
 def import_pushes(
     out: Path,
-    settings: Mapping[str, Any],
+    settings: Mapping[str, object],
     pushes: Sequence[ResampledPush],
     properties: Properties,
     *,

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from sainet.datasets.recorded.tables import SHOWN, Problems, Table, Texts
+from sainet.datasets.schema import Arrays
 from sainet.runs.errors import BadTable
 
 # Fields of a record, and the columns of the CSV table with the same content.
@@ -75,13 +76,14 @@ def read_mat(path: Path, data: bytes, problems: Problems) -> tuple[Table, str]:
     return table, match["model"]
 
 
-def _load(path: Path, data: bytes) -> dict[str, Any]:
+def _load(path: Path, data: bytes) -> Arrays:
     from scipy.io import loadmat
 
     names = ["record_all", *_INSIDE.values()]
     # SciPy's reader raises arbitrary exceptions on damaged files.
     try:
-        return loadmat(io.BytesIO(data), variable_names=names)
+        found = loadmat(io.BytesIO(data), variable_names=names)
+        return {name: found[name] for name in names if name in found}
     except Exception as error:
         reason = (str(error) or type(error).__name__).partition("\n")[0][:100]
         raise BadTable(
@@ -89,7 +91,9 @@ def _load(path: Path, data: bytes) -> dict[str, Any]:
         ) from None
 
 
-def _check_name(path: Path, named: dict[str, str], content: dict[str, Any]) -> None:
+def _check_name(
+    path: Path, named: dict[str, str], content: dict[str, np.ndarray]
+) -> None:
     """Refuse a renamed log: a square would pass for a disk."""
     for part, field in _INSIDE.items():
         if field not in content or np.size(content[field]) != 1:
