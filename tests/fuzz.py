@@ -59,7 +59,7 @@ from sainet.runs.documents import (  # noqa: E402
 )
 from sainet.runs.errors import SainetError  # noqa: E402
 from sainet.runs.folders import open_run  # noqa: E402
-from sainet.scenes.camera import CameraOffset  # noqa: E402
+from sainet.scenes.recording import CameraOffset  # noqa: E402
 
 SLOWEST = 10.0  # s for one case
 MOST_MEMORY = 2 << 20  # kB that one case may add

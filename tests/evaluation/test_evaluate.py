@@ -29,7 +29,7 @@ from sainet.models.identity import ModelId
 from sainet.models.library import Model, load_model
 from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, Diverged, UnknownName
-from sainet.scenes.camera import CameraOffset
+from sainet.scenes.recording import CameraOffset
 from sainet.scenes.state import State, Trajectory
 
 PUSHES = 11

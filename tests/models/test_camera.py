@@ -12,8 +12,8 @@ from sainet.engines.base import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.models.dynamics import PhysicsDynamics, SimulatorAugmented, predict
 from sainet.models.wrappers import OffsetCamera, with_camera
-from sainet.scenes.camera import CameraOffset
 from sainet.scenes.controls import PathControls
+from sainet.scenes.recording import CameraOffset
 from sainet.scenes.state import pack_motion
 
 STEPS = 40

@@ -1,8 +1,8 @@
-"""Bystanders: disks added to stored pushes, which nothing touches.
+"""Bystanders: untouched disks added to stored pushes.
 
 In two-disk pushes the disks touch: a network trained only on such pushes predicts an
 effect even between disks that do not interact. The ground truth of a bystander needs
-neither simulation nor recording, because it stays at rest and changes nothing else. A
+neither simulation nor recording, because it stays at rest and affects nothing. A
 bystander can be added to any push with known paths, at any position that these paths
 never reach, also next to another disk. Only the simulator prediction is computed again:
 with assumed radii the disks may overlap.
@@ -165,10 +165,10 @@ def _place(
         gap = np.where(rng.random(len(left)) < TOUCHING, _TOUCH, gap)
         start = arrays["initial"][left, beside, :2]
         reach = arrays["radius"][left, beside] + radius[left] + gap
-        way = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-        tried = start + reach[:, None] * way
-        those = [disk.of(left) for disk in disks]
-        free = _is_free(tried, radius[left], those, pusher.of(left))
+        direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        tried = start + reach[:, None] * direction
+        others = [disk.of(left) for disk in disks]
+        free = _is_free(tried, radius[left], others, pusher.of(left))
         place[left[free]] = tried[free]
         left = left[~free]
     return place
@@ -177,16 +177,16 @@ def _place(
 def _round_things(arrays: Arrays) -> list[_Round]:
     """Return the disks, then the pusher."""
     initial, truth = arrays["initial"][:, None, :, :2], arrays["truth"][..., :2]
-    hand = arrays["initial_pusher"][:, None]
+    tip = arrays["initial_pusher"][:, None]
     # Steps after the end of a push repeat the start.
     truth = np.where(_lasts(arrays)[..., None, None], truth, initial)
-    pusher = np.where(_lasts(arrays)[..., None], arrays["truth_pusher"], hand)
+    pusher = np.where(_lasts(arrays)[..., None], arrays["truth_pusher"], tip)
     paths = np.concatenate([initial, truth], axis=1, dtype=float)
     disks = [
         _Round(paths[:, :, body], arrays["radius"][:, body])
         for body in range(paths.shape[2])
     ]
-    path = np.concatenate([hand, pusher], axis=1, dtype=float)
+    path = np.concatenate([tip, pusher], axis=1, dtype=float)
     return [*disks, _Round(path, arrays["pusher_radius"])]
 
 
@@ -201,7 +201,7 @@ def _is_free(
     The disk nearest to the pusher at the start counts as the pushed disk.
     """
     gaps = [thing.gaps(place, radius).min(1) for thing in (*disks, pusher)]
-    hand = pusher.path[:, 0]
-    pushed = np.min([d.gaps(hand, pusher.radius)[:, 0] for d in disks], axis=0)
+    tip = pusher.path[:, 0]
+    pushed = np.min([d.gaps(tip, pusher.radius)[:, 0] for d in disks], axis=0)
     nearest = pusher.gaps(place, radius)[:, 0]
     return (np.min(gaps, axis=0) >= 0) & (nearest > pushed + _BESIDE_PUSHER)

@@ -13,8 +13,8 @@ import msgspec
 
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import unknown_name
-from sainet.scenes.camera import AGREES, CameraOffset
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
+from sainet.scenes.recording import AGREES, CameraOffset
 
 if TYPE_CHECKING:
     from sainet.engines.base import AssumedProperties

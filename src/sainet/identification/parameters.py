@@ -15,7 +15,7 @@ from sainet.engines.simulator import (
     InternalEngine,
     PlanarSpec,
 )
-from sainet.scenes.camera import CameraOffset
+from sainet.scenes.recording import CameraOffset
 from sainet.scenes.scene import Scene
 
 FRICTIONS = ("pusher_friction", "disk_friction", "table_friction")

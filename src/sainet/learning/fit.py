@@ -43,7 +43,7 @@ from sainet.runs.errors import Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
-from sainet.scenes.camera import AGREES
+from sainet.scenes.recording import AGREES
 
 STATE = "state.safetensors"
 Validate = Callable[[InteractionNetwork], float]

@@ -11,8 +11,8 @@ from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadCheckpoint, BadInput
 from sainet.runs.folders import CONFIG, remake
 from sainet.runs.manifest import Manifest
-from sainet.scenes.camera import AGREES, CameraOffset
 from sainet.scenes.quantities import Finite, Size, TimeStep
+from sainet.scenes.recording import AGREES, CameraOffset
 
 CARD = "card.json"
 WEIGHTS = "network.safetensors"

@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 from sainet.models.correctors import Purpose
 from sainet.models.dynamics import AbstractDynamics
 from sainet.runs.errors import BadInput
-from sainet.scenes.camera import CameraOffset
 from sainet.scenes.controls import Controls
+from sainet.scenes.recording import CameraOffset
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 

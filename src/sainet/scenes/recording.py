@@ -1,12 +1,14 @@
-"""One executed push: what robots return and readers of recorded pushes make."""
+"""Recordings of executed pushes, and the offset of the camera that measures them."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 
 from sainet.runs.errors import BadInput
+from sainet.scenes.quantities import CAMERA_OFFSET
 
 if TYPE_CHECKING:
     from sainet.scenes.pushes import Push
@@ -53,3 +55,26 @@ class Recording:
     def bodies(self) -> int:
         """The number of disks."""
         return self.pose.shape[1]
+
+
+_MOST = CAMERA_OFFSET.high / 1000
+Offset = Annotated[float, msgspec.Meta(ge=-_MOST, le=_MOST)]  # m
+
+
+class CameraOffset(msgspec.Struct, frozen=True, kw_only=True):
+    """Camera-measured minus robot-measured position, the same everywhere."""
+
+    x: Offset = 0.0  # m
+    y: Offset = 0.0  # m
+
+    def __bool__(self) -> bool:
+        """Whether camera and robot disagree."""
+        return bool(self.x or self.y)
+
+    @property
+    def vector(self) -> tuple[float, float]:
+        """The offset (m)."""
+        return self.x, self.y
+
+
+AGREES = CameraOffset()

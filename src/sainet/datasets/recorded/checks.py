@@ -1,4 +1,4 @@
-"""Checks that every recorded push passes, whatever file it came from."""
+"""Checks of recorded pushes, the same for every file format."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,10 +21,11 @@ _MOVE = 0.005  # m, between samples of 250 Hz: 1.25 m/s
 _TURN = np.deg2rad(10)  # rad, between samples of 250 Hz: 44 rad/s
 _SPACING = 1 / 250  # s
 _DEEPEST = 0.005  # m of overlap at the start
-_NEAREST = 0.02  # m: a pusher that stays farther away moves no disk
+_NEAREST = 0.02  # m: a pusher farther away moves no disk
 _STILL = 0.002  # m
-# The rim of a disk turns no further than what pushes it moves; in degrees it seems to
-# turn 57 times as far. A pushed disk moves no further than the pusher, and then slides.
+# The rim of a disk moves no further than the pusher or the disk that drives it; angles
+# in degrees make this motion 57 times larger. A pushed disk moves as far as the pusher,
+# and then slides.
 _MOST, _SLACK = 3.0, 0.02  # of the travel, and m
 _LOWEST_FRICTION = 0.05
 
@@ -35,7 +36,7 @@ class Problem:
 
     kind: str  # equal for equal problems of different pushes
     text: str  # with values and remedy, without a full stop
-    sample: int = 0  # at which it shows
+    sample: int = 0  # at which it occurs
     body: int = 0
 
 

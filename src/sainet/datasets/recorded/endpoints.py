@@ -1,4 +1,4 @@
-"""Pushes of the MIT Push dataset of which the poses before and after are known."""
+"""Pushes of the MIT Push dataset with poses before and after each push."""
 
 import logging
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ COLUMNS = Columns(
 
 @dataclass(frozen=True)
 class Endpoints:
-    """Pushes along straight lines; the pose is known before and after, only then."""
+    """Pushes along straight lines with poses before and after, none in between."""
 
     recordings: list[Recording]  # two samples each
     published: Float[np.ndarray, "push 3"]  # m, m, rad: end by a published model
@@ -77,7 +77,7 @@ def import_endpoints(
     contact_friction: float = CONTACT_FRICTION,
     table_friction: float = TABLE_FRICTION,
 ) -> Store:
-    """Make a store of pushes of which only both ends are known.
+    """Make a store of pushes with known poses at both ends only.
 
     The pusher moves along the straight line between its recorded ends at constant
     speed; a gap or an overlap between pusher and disk stays as it was recorded.
@@ -108,7 +108,7 @@ def import_endpoints(
         "observed": "poses before and after each push; no state in between",
         "contact_friction_origin": CONTACT_FRICTION_ORIGIN if default else "given",
     }
-    # Between both ends, however near in time, nothing is known.
+    # No pose between both ends is known, however near in time they are.
     pushes = [resample(each, longest_gap=0.0) for each in found.recordings]
     published = {found.model: found.published[:, None]}
     return import_pushes(
@@ -147,7 +147,7 @@ def read_endpoints(path: Path, data: bytes, properties: Properties) -> Endpoints
     else:
         table, model = read_csv(path, data, COLUMNS, problems), "poly4"
         if not data.endswith((b"\n", b"\r")):
-            _log.warning("%s: does not end in a line break; is it cut?", path)
+            _log.warning("%s: does not end in a line break; it may be truncated", path)
     _check_shapes(table, problems)
     table.check(problems, SPEED, "vel_mm_s")
     for *places, angle in _POSES:
@@ -159,7 +159,7 @@ def read_endpoints(path: Path, data: bytes, properties: Properties) -> Endpoints
     for row, recording in enumerate(recordings):
         for problem in recording_problems(recording, properties):
             problems.add(problem.kind, f"{table.where(row)}: {problem.text}.")
-            break  # the others may follow from the first
+            break  # later problems may follow from the first
     problems.raise_any()
     before = _columns(table, _BEFORE)
     published = _unwrapped(_columns(table, _PUBLISHED), before)

@@ -1,4 +1,4 @@
-"""Resampled pushes written as a store, with simulator predictions beside them."""
+"""Import of resampled pushes as a store with simulator predictions."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import asdict
@@ -52,7 +52,7 @@ def import_pushes(
 
     Raises:
         RunConflict: the folder holds something else.
-        Diverged: an assumed engine left the numbers.
+        Diverged: an assumed engine produced NaN or infinity.
         BadInput: the disk is full.
     """
     out, published = Path(out), published or {}
@@ -62,15 +62,15 @@ def import_pushes(
     def make_chunk(index: int) -> Arrays:
         rows = info.chunk_slice(index)
         part = pushes[rows]
-        # Fill the last chunk up: another size would be compiled anew.
+        # Repeat pushes to fill the last chunk: another size would be compiled again.
         whole = [part[i % len(part)] for i in range(min(info.chunk_size, info.pushes))]
         arrays = chunk_arrays(whole, properties, info)
         arrays = {name: array[: len(part)] for name, array in arrays.items()}
         extra = {published_name(name): poses[rows] for name, poses in published.items()}
         return arrays | extra | {"repeat": repeats[rows]}
 
-    told = {**settings, **asdict(properties), "assumed_engines": engines}
-    write_once(out, told, info, make_chunk)
+    known = {**settings, **asdict(properties), "assumed_engines": engines}
+    write_once(out, known, info, make_chunk)
     return open_store(out)
 
 

@@ -94,7 +94,7 @@ def _load(path: Path, data: bytes) -> Arrays:
 def _check_name(
     path: Path, named: dict[str, str], content: dict[str, np.ndarray]
 ) -> None:
-    """Refuse a renamed log: a square would pass for a disk."""
+    """Refuse a renamed log: a square would be read as a disk."""
     for part, field in _INSIDE.items():
         if field not in content or np.size(content[field]) != 1:
             continue
@@ -108,7 +108,7 @@ def _check_name(
 
 
 def _row(path: Path, index: int, record: Any) -> dict[str, float]:  # noqa: ANN401
-    """Return one record, a structure inside whatever cells it is wrapped in."""
+    """Return one record, a structure in nested cells."""
     record = _unwrap(record)
     row: dict[str, float] = {}
     for field, columns in FIELDS.items():

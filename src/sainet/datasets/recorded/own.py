@@ -133,7 +133,7 @@ def _recordings(
     table.check(problems, PLACE, *_PLACES)
     table.check(problems, ANGLE, "angle")
     if not table.is_whole:
-        return  # what follows would only repeat the problems of the header and rows
+        return  # further checks would repeat the problems of the header and rows
     units_fit = not ({PLACE.name, ANGLE.name} & problems.kinds)
     for push in _by_push(table, properties):
         recording = push.to_recording(problems) if push.is_sound(problems) else None
@@ -144,7 +144,7 @@ def _recordings(
             row = push.rows[problem.body][problem.sample]
             line = f"{table.where(row)}: {push.name}: {problem.text}."
             problems.add(problem.kind, line)
-            break  # the others may follow from the first
+            break  # later problems may follow from the first
         else:
             yield recording
 
@@ -194,7 +194,7 @@ class _Push:
         return range(len(self.bodies))
 
     def _problem(self, first: int, body: int) -> tuple[str, np.integer, str] | None:
-        """Return kind, row and text of what is wrong with a body's rows, if anything.
+        """Return kind, row and text of the first problem of a body's rows, if any.
 
         Args:
             first: body to which its times and its pusher are compared.

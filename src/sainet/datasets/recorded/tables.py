@@ -94,8 +94,12 @@ class Columns:
         for what, names in wrong.items():
             if names:
                 hints = [_hint(n, unknown) if what == "missing" else "" for n in names]
-                told = ", ".join(n + hint for n, hint in zip(names, hints, strict=True))
-                verb = f"column {told} is" if len(names) == 1 else f"columns {told} are"
+                named = ", ".join(
+                    n + hint for n, hint in zip(names, hints, strict=True)
+                )
+                verb = (
+                    f"column {named} is" if len(names) == 1 else f"columns {named} are"
+                )
                 line = f"{path}: row 1: {verb} {what}.{self.note}"
                 problems.add(f"columns {what}", line)
         return not (wrong["missing"] or wrong["there twice"])
