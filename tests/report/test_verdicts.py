@@ -3,9 +3,9 @@
 import pytest
 
 from report import samples
-from sainet.evaluation.claims import PUBLISHED_ORDER
+from sainet.evaluation.claims import PUBLISHED_ORDER, errs_less, solves_more
 from sainet.evaluation.measurements import Condition, PublishedValues
-from sainet.evaluation.summary import Summary
+from sainet.evaluation.summary import Comparison, Estimate, Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 from sainet.models.identity import ModelId
 from sainet.report.verdicts import beside_published, verdicts_on
@@ -116,3 +116,37 @@ def test_errors_rank_as_published_or_the_exceptions_are_named(
 
 def test_without_published_errors_their_order_is_not_testable():
     assert PUBLISHED_ORDER.rule(samples.summary([])).status == "not testable here"
+
+
+def compared_by(low, high):
+    """A summary of SAIN compared with IN, by intervals with these ends."""
+    names = {"model": "sain", "against": "in", "condition": "", "body": 1}
+    difference = Estimate((low + high) / 2, low, high)
+    found = [
+        Comparison(**names, metric=metric, difference=difference)
+        for metric in ("pos_mm", "rot_deg")
+    ]
+    return Summary(models=(), comparisons=tuple(found))
+
+
+@pytest.mark.parametrize(
+    ("ends", "status", "reverse"),
+    [
+        ((-2.0, -1.0), "holds", "does not hold"),
+        ((1.0, 2.0), "does not hold", "holds"),
+        ((-1.0, 1.0), "does not hold", "does not hold"),
+    ],
+)
+def test_a_model_errs_less_if_every_interval_lies_below_zero(ends, status, reverse):
+    found = compared_by(*ends)
+    assert errs_less("sain", "in")(found).status == status
+    assert errs_less("in", "sain")(found).status == reverse
+    assert errs_less("sain", "physics")(found).status == "not testable here"
+
+
+@pytest.mark.parametrize(("p", "status"), [(0.001, "holds"), (0.2, "does not hold")])
+def test_a_model_solves_more_if_chance_is_an_unlikely_reason(p, status):
+    found = summary([paired("three disks", "in", "physics", p)])
+    assert solves_more("physics", "in", "three disks")(found).status == status
+    assert solves_more("in", "physics", "three disks")(found).status == "does not hold"
+    assert solves_more("in", "gp", "three disks")(found).status == "not testable here"

@@ -11,11 +11,12 @@ from selenium.webdriver.support.ui import WebDriverWait
 from report.test_report_browser import element, milliseconds, opened
 from sainet.cli.output import Output
 from sainet.cli.reproduce import Reproduce
+from sainet.evaluation.claims import Claim, Verdict
 from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
 from sainet.studies import STUDIES, load_study
-from sainet.studies.published import PUBLISHED_ROBOT_TWO_DISKS
-from sainet.studies.study import Result, Study
+from sainet.studies.paper_tables import PUBLISHED_ROBOT_TWO_DISKS
+from sainet.studies.study import Plan, Result, Ruling, Study
 from support import SOURCE
 
 TINY = ("--pushes", "100", "--test-pushes", "6", "--iterations", "2")
@@ -106,6 +107,28 @@ def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys
     assert not_run.keys() == set(STUDIES) - {"robot-planar", "fine-tuning"}
     assert not_run["recorded-pushes"].startswith("--recorded is missing: give")
     assert "PyBullet" in not_run["engine-parity"]
+
+
+def test_claims_are_printed_and_in_the_json(monkeypatch, capsys):
+    ruled = Result(
+        summary=Summary(models=()), claims=(Ruling("the sky is blue", "holds"),)
+    )
+    claim = Claim("the sky is blue", lambda summary: Verdict("holds"))
+    study = Study(question="Is it?", plan=Plan, needs=(), claims=(claim,))
+    monkeypatch.setattr("sainet.studies.load_study", lambda name: study)
+    monkeypatch.setattr(Study, "run", lambda self, scope, runner, out: ruled)
+    monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
+    found = Reproduce(studies=("robot-planar",)).run()
+    assert [*found["claims"]] == [{"claim": "the sky is blue", "status": "holds"}]
+    assert "Claim: the sky is blue. Verdict: holds." in capsys.readouterr().out
+
+
+def test_every_claim_is_a_sentence_that_a_summary_can_test():
+    studies = [load_study(name) for name in STUDIES]
+    claims = [claim for study in studies for claim in study.claims]
+    assert len(claims) > len({claim.text for claim in claims}) > 5
+    for claim in claims:
+        assert claim.rule(Summary(models=())).status == "not testable here"
 
 
 def test_parallel_training_is_refused_on_one_gpu(begun, monkeypatch):

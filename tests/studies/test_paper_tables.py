@@ -12,7 +12,7 @@ from sainet.models.card import read_card
 from sainet.runs.documents import read_json
 from sainet.studies.data_efficiency import AGAIN_CONDITION, IN_FULL
 from sainet.studies.paper_setup import NETWORKS
-from sainet.studies.published import PUBLISHED_DIRECT_FORCE_THREE_DISKS
+from sainet.studies.paper_tables import PUBLISHED_DIRECT_FORCE_THREE_DISKS
 from sainet.studies.robustness import push_angles
 from sainet.studies.study import STEPS
 from sainet.studies.variants import score

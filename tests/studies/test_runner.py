@@ -15,7 +15,7 @@ from sainet.runs.errors import RunConflict, SainetError
 from sainet.runs.workers import worker_pool
 from sainet.studies.paper_setup import IN, SAIN
 from sainet.studies.runner import Runner
-from sainet.studies.steps import Step, Train, given
+from sainet.studies.steps import Given, Step, Train
 
 CONFIG = PAPER.changed(iterations=20, batch_size=8, log_every=5)
 SEEDS = (3, 4)
@@ -81,15 +81,15 @@ def test_the_key_depends_on_type_settings_and_inputs(store):
     keys = {one.key, Sum("b", []).key, Other("a", []).key, Sum("a", [], (one,)).key}
     assert len(keys) == 4
     assert Sum("a", []).key == one.key
-    data = given(store)
+    data = Given(store)
     keys = {
         Train(network, data, CONFIG.changed(seed=seed)).key
         for network in (IN, SAIN)
         for seed in SEEDS
     }
     assert len(keys) == 4
-    assert Train(IN, data, CONFIG).key == Train(IN, given(store), CONFIG).key
-    assert Train(IN, given(store.first(3)), CONFIG).key != Train(IN, data, CONFIG).key
+    assert Train(IN, data, CONFIG).key == Train(IN, Given(store), CONFIG).key
+    assert Train(IN, Given(store.first(3)), CONFIG).key != Train(IN, data, CONFIG).key
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +109,7 @@ class All(Step[list]):
 def networks(store, seeds=SEEDS):
     return All(
         tuple(
-            Train(network, given(store), CONFIG.changed(seed=seed))
+            Train(network, Given(store), CONFIG.changed(seed=seed))
             for network in (IN, SAIN)
             for seed in seeds
         )
@@ -148,14 +148,14 @@ def test_parallel_training_gives_the_same_networks(store, tmp_path):
     again, told = runner_of(at_once.out, Broken())
     again.result(step)
     assert list(told.values()) == [(20, 20, True)] * 4
-    again.result(All((*step.networks, Train(IN, given(store), CONFIG))))
+    again.result(All((*step.networks, Train(IN, Given(store), CONFIG))))
     assert told["Training in-seed-0"] == (20, 20, True)
 
 
 def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
     runner = Runner(tmp_path)
-    first = Train(IN, given(store), CONFIG.changed(seed=3))
-    second = Train(IN, given(store), CONFIG.changed(seed=3), start=first)
+    first = Train(IN, Given(store), CONFIG.changed(seed=3))
+    second = Train(IN, Given(store), CONFIG.changed(seed=3), start=first)
     assert list(second.inputs)[1:] == [first]
     runner._results[second.pushes.key] = store
     _, _, recipe, out = second.fitting(runner).args

@@ -13,8 +13,7 @@ from sainet.report.writers import print_table, to_markdown
 from sainet.runs.documents import read_json
 from sainet.studies import simulated_control
 from sainet.studies.paper_setup import IN, SAIN
-from sainet.studies.published import PUBLISHED_SIMULATED_CONTROL
-from sainet.studies.simulated_control import MODELS, trials
+from sainet.studies.simulated_control import MODELS, PUBLISHED_SIMULATED_CONTROL, trials
 
 
 def test_the_trials_include_those_of_the_paper():

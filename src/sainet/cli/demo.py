@@ -6,7 +6,7 @@ from pathlib import Path
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Bars, Json, Output
 from sainet.runs.workers import worker_pool
-from sainet.studies.config import DemoConfig
+from sainet.studies import DemoConfig
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,7 +13,7 @@ from sainet.cli.help import message
 from sainet.cli.output import Bars, Json, Output
 from sainet.runs.errors import BadInput, MissingExtra
 from sainet.runs.workers import core_count, worker_pool
-from sainet.studies.config import Scale
+from sainet.studies import Scale
 
 if TYPE_CHECKING:
     from sainet.studies.runner import Runner

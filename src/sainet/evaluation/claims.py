@@ -71,6 +71,43 @@ PUBLISHED_ORDER = Claim(
 )
 
 
+def errs_less(
+    model: str,
+    against: str,
+    *,
+    condition: str = "",
+    metrics: Sequence[str] = ("pos_mm", "rot_deg"),
+) -> Callable[[Summary], Verdict]:
+    """Return the rule that a model errs less: every interval lies below zero."""
+
+    def rule(summary: Summary) -> Verdict:
+        pairs = compared(summary, model, against, condition)
+        found = tuple(each for each in pairs if each.metric in metrics)
+        if not found or any(each.difference.low is None for each in found):
+            return Verdict("not testable here", found)
+        wrong = tuple(each for each in found if sign(each) >= 0)
+        return Verdict("does not hold" if wrong else "holds", found, wrong)
+
+    return rule
+
+
+def solves_more(
+    model: str, against: str, condition: str
+) -> Callable[[Summary], Verdict]:
+    """Return the rule that a model solves more goals, by more than chance."""
+
+    def rule(summary: Summary) -> Verdict:
+        rows = [each for each in summary.trials if each.condition == condition]
+        if not {model, against} <= {row.model for row in rows}:
+            return Verdict("not testable here")
+        found = rank_models(summary, condition).better
+        better = {row.model: others for row, others in found}
+        holds = against in (row.model for row in better.get(model, ()))
+        return Verdict("holds" if holds else "does not hold")
+
+    return rule
+
+
 def our_model(published: ModelId, summary: Summary) -> str:
     """Return the slug of our model that corresponds to a published one.
 

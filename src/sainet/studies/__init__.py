@@ -1,11 +1,15 @@
 """Studies of the paper and beyond, the runner of their steps, and the demo."""
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 from sainet.runs.names import load_named
 
 if TYPE_CHECKING:
     from sainet.studies.study import Study
+
+Scale = Literal["quick", "paper"]
+
 
 STUDIES = {
     "direct-force-two-disks": "sainet.studies.paper_tables:DIRECT_FORCE_TWO_DISKS",
@@ -32,3 +36,17 @@ def load_study(name: str) -> "Study":
         UnknownName: no study has this name.
     """
     return load_named("study", STUDIES, name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemoConfig:
+    """Size of the demo."""
+
+    pushes: int = 1000
+    """Number of training pushes."""
+    test_pushes: int = 200
+    """Number of test pushes."""
+    iterations: int = 300
+    """Number of iterations per network."""
+    seed: int = 0
+    """Random seed."""

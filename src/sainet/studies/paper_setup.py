@@ -12,7 +12,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import FINE_TUNING, PAPER, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.library import PHYSICS
-from sainet.studies.config import Scale
+from sainet.studies import Scale
 from sainet.studies.steps import (
     Evaluate,
     First,

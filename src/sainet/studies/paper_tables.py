@@ -8,13 +8,10 @@ Table II has the networks a second time, fine-tuned beside a bystander.
 
 from sainet.datasets.config import GenerateConfig
 from sainet.evaluation.claims import PUBLISHED_ORDER
+from sainet.evaluation.measurements import PublishedValues
 from sainet.learning.recipes import PAPER
+from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import IN, NETWORKS, SAIN, PaperSetup, physics
-from sainet.studies.published import (
-    PUBLISHED_DIRECT_FORCE_THREE_DISKS,
-    PUBLISHED_DIRECT_FORCE_TWO_DISKS,
-    PUBLISHED_ROBOT_TWO_DISKS,
-)
 from sainet.studies.steps import Evaluate, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import SetupName
@@ -23,6 +20,39 @@ BESIDE = NETWORKS  # fine-tuned beside a bystander
 SEEDS = {"quick": range(1), "paper": range(5)}  # training runs of each network
 # Training pushes, test pushes, iterations, training runs of the table on planar.
 _PLANAR_SIZES = {"quick": (1000, 200, 500, 1), "paper": (4500, 500, 10_000, 3)}
+
+
+def _errors(
+    model: ModelId,
+    trans: tuple[float, ...],  # %
+    pos: tuple[float, ...],  # mm
+    rot: tuple[float, ...],  # deg
+) -> PublishedValues:
+    """Return the published errors of one model, for each disk."""
+    return PublishedValues(
+        condition="",
+        model=model,
+        values={"trans_percent": trans, "pos_mm": pos, "rot_deg": rot},
+    )
+
+
+# Of the paper (Ajay et al., ICRA 2019).
+_PHYSICS = physics()[0].id
+PUBLISHED_DIRECT_FORCE_TWO_DISKS = (
+    _errors(_PHYSICS, (2.82, 2.31), (6.57, 6.05), (0.91, 0.45)),
+    _errors(IN, (2.09, 1.47), (5.61, 3.79), (0.68, 0.26)),
+    _errors(SAIN, (1.62, 1.38), (4.38, 3.34), (0.38, 0.20)),
+)
+PUBLISHED_DIRECT_FORCE_THREE_DISKS = (
+    _errors(_PHYSICS, (2.79, 2.34, 2.38), (6.53, 6.11, 6.21), (0.89, 0.48, 0.49)),
+    _errors(IN, (2.12, 1.63, 1.67), (5.68, 4.41, 4.52), (0.70, 0.34, 0.38)),
+    _errors(SAIN, (1.68, 1.52, 1.61), (4.54, 3.97, 4.34), (0.41, 0.25, 0.32)),
+)
+PUBLISHED_ROBOT_TWO_DISKS = (
+    _errors(_PHYSICS, (2.52, 2.19), (6.27, 5.81), (0.85, 0.29)),
+    _errors(IN, (2.13, 1.59), (5.76, 3.84), (0.72, 0.28)),
+    _errors(SAIN, (1.82, 1.50), (4.66, 3.47), (0.40, 0.21)),
+)
 
 
 def _two_disks(setup: SetupName, scope: Scope) -> Plan:
@@ -63,25 +93,25 @@ DIRECT_FORCE_TWO_DISKS = Study(
     question="Table I: does a network around an engine err less than either, on "
     "pushes of two disks by a force?",
     plan=lambda scope: _two_disks("direct-force", scope),
-    published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
     claims=(PUBLISHED_ORDER,),
+    published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
 )
 DIRECT_FORCE_THREE_DISKS = Study(
     question="Table II: do networks trained on two disks predict three?",
     plan=_three_disks,
-    published=PUBLISHED_DIRECT_FORCE_THREE_DISKS,
     claims=(PUBLISHED_ORDER,),
+    published=PUBLISHED_DIRECT_FORCE_THREE_DISKS,
 )
 ROBOT_TWO_DISKS = Study(
     question="Table III: the same as Table I on pushes by a robot?",
     plan=lambda scope: _two_disks("robot", scope),
-    published=PUBLISHED_ROBOT_TWO_DISKS,
     claims=(PUBLISHED_ORDER,),
+    published=PUBLISHED_ROBOT_TWO_DISKS,
 )
 ROBOT_PLANAR = Study(
     question="Table III with the planar engine as truth, on the base installation?",
     plan=_planar,
     needs=(),
-    published=PUBLISHED_ROBOT_TWO_DISKS,
     claims=(PUBLISHED_ORDER,),
+    published=PUBLISHED_ROBOT_TWO_DISKS,
 )

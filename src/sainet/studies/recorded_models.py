@@ -1,6 +1,5 @@
 """The models that are compared on recorded pushes, and how each is made."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -22,9 +21,9 @@ from sainet.models.identity import Features, ModelId, ModelKind
 from sainet.models.identity import Variant as Made
 from sainet.models.library import Model, load_model, network_folder
 from sainet.models.wrappers import with_camera
-from sainet.studies.config import Scale
+from sainet.studies import Scale
 from sainet.studies.paper_setup import physics, scaled
-from sainet.studies.steps import Evaluate, Identify, Load, Step, Train, given
+from sainet.studies.steps import Given, Identify, Load, Step, Train
 
 if TYPE_CHECKING:
     from sainet.studies.runner import Runner
@@ -79,11 +78,6 @@ class AroundIdentified(Step[Model]):
     network: str
     identified: Identify
 
-    @property
-    def name(self) -> str:
-        """The name in tables."""
-        return self.id.slug
-
     def run(self, runner: "Runner") -> Model:
         """Return the model."""
         network = load_network(network_folder(self.network))[0]
@@ -99,7 +93,7 @@ class Tuner:
     def __init__(self, training: Store, scale: Scale) -> None:
         """Identify the engine on the same pushes."""
         self._scale: Scale = scale
-        self._pushes = given(training)
+        self._pushes = Given(training)
         identity = ModelId(kind="physics", simulator=_IDENTIFIED)
         self.identified = Identify(identity, self._pushes)
 
@@ -126,8 +120,3 @@ class Tuner:
             scaled(recipe, self._scale, self._pushes.store.info.pushes),
             self.identified if is_identified else None,
         )
-
-    @staticmethod
-    def compare(models: Sequence[Step[Model]], tests: Store) -> Evaluate:
-        """Return the errors of models on test pushes."""
-        return Evaluate(tuple(models), given(tests))

@@ -15,13 +15,14 @@ import numpy as np
 
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
+from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.evaluate import EndOffsets, end_offsets
 from sainet.evaluation.joining import add_models, join_folds, without_predictions
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.models.identity import Features, ModelKind
 from sainet.models.library import Model
 from sainet.studies.recorded_models import Inside, Learned, Tuner, Variant, surfaces_of
-from sainet.studies.steps import Evaluate, Given, Join, Step, given
+from sainet.studies.steps import Evaluate, Given, Join, Step
 from sainet.studies.study import RECORDED, Plan, Scope, Study
 
 if TYPE_CHECKING:
@@ -69,11 +70,6 @@ class JoinFolds(Step[Measurements]):
     folds: tuple[Fold, ...] = field(repr=False)  # of the parts, which identify them
     condition: Condition | None = None
 
-    @property
-    def name(self) -> str:
-        """The number of folds."""
-        return f"{len(self.folds)} folds"
-
     def run(self, runner: "Runner") -> Measurements:
         """Return the measurements in one condition, if one is given."""
         measured = map(runner.result, self.parts)
@@ -88,11 +84,6 @@ class BySurface(Step[Measurements]):
     own: JoinFolds  # by models of one surface
     for_all: JoinFolds  # by models of all surfaces
     pushes: Given
-
-    @property
-    def name(self) -> str:
-        """The pushes."""
-        return self.pushes.name
 
     def run(self, runner: "Runner") -> Measurements:
         """Return the measurements of both kinds of models."""
@@ -115,11 +106,6 @@ class EndErrors(Step[EndOffsets]):
     model: Step[Model]
     pushes: Given
 
-    @property
-    def name(self) -> str:
-        """The engine."""
-        return self.model.name
-
     def run(self, runner: "Runner") -> EndOffsets:
         """Return the errors."""
         return end_offsets(runner.result(self.model), self.pushes.store)
@@ -135,21 +121,21 @@ def _plan(scope: Scope) -> Plan:
             tuner = Tuner(fold.training, scale)
             models = (*tuner.physics(), *map(tuner.model, VARIANTS))
             own_folds.append(fold)
-            own.append(tuner.compare(models, fold.tests))
+            own.append(Evaluate(tuple(models), Given(fold.tests)))
         pushes = store.take(rows)
         for engine, model in zip(
             ("", ", identified"), Tuner(pushes, scale).physics(), strict=True
         ):
-            engine_errors[f"{surface}{engine}"] = EndErrors(model, given(pushes))
+            engine_errors[f"{surface}{engine}"] = EndErrors(model, Given(pushes))
     folds = make_folds(store, FOLDS[scale])
     for fold in folds:
         tuner = Tuner(fold.training, scale)
         models = [tuner.model(variant, "for-all") for variant in FOR_ALL]
-        every.append(tuner.compare(models, fold.tests))
+        every.append(Evaluate(tuple(models), Given(fold.tests)))
     whole = BySurface(
         JoinFolds(tuple(own), tuple(own_folds)),
         JoinFolds(tuple(every), tuple(folds)),
-        given(store),
+        Given(store),
     )
     joined = Join((whole, *_elsewhere(scope, store)))
     return Plan(joined, engine_errors=engine_errors)
@@ -170,7 +156,7 @@ def _elsewhere(scope: Scope, store: Store) -> Iterator[Evaluate]:
         label = f"{_FROM} to {_TO}, {count} of it"
         factors = {"surface": _TO, "trained_on": _FROM, "training_pushes": count}
         condition = Condition(label=label, factors=factors)
-        yield Evaluate(models, given(store.take(tests)), condition)
+        yield Evaluate(models, Given(store.take(tests)), condition)
 
 
 def _few(store: Store, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -186,6 +172,17 @@ STUDY = Study(
     question="On recorded pushes, is identifying the engine enough, or does learning "
     "err less?",
     plan=_plan,
+    claims=(
+        Claim(
+            "an additive network around the identified engine errs less than it alone",
+            errs_less(
+                SUBJECT,
+                "physics-identified",
+                condition=_EVERYWHERE,
+                metrics=("final_pos_mm", "final_rot_deg"),
+            ),
+        ),
+    ),
     needs=(RECORDED,),
     subject=SUBJECT,
 )

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 from sainet.control.config import ControlConfig
 from sainet.engines.simulator import SIMULATORS
-from sainet.evaluation.measurements import Condition
+from sainet.evaluation.claims import Claim, solves_more
+from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import IN, SAIN
-from sainet.studies.published import PUBLISHED_SIMULATED_CONTROL
 from sainet.studies.steps import Join, RunTrials
 from sainet.studies.study import Plan, Scope, Study
 
@@ -56,9 +56,32 @@ def _trials(label: str, config: ControlConfig) -> RunTrials:
     return RunTrials(MODELS, config, Condition(label=label, factors=factors))
 
 
+def _published(condition: str, model: ModelId, success: float) -> PublishedValues:
+    """Return the published share of solved trials of one model."""
+    return PublishedValues(
+        condition=condition,
+        model=model,
+        values={"success": (success,)},
+        trials=25,
+    )
+
+
+# Of the paper (Ajay et al., ICRA 2019): Bullet's world, the paper's search.
+PUBLISHED_SIMULATED_CONTROL = (
+    _published("easy, greedy", IN, 1.00),
+    _published("hard, greedy", IN, 0.88),
+    _published("easy, greedy", SAIN, 1.00),
+    _published("hard, greedy", SAIN, 1.00),
+)
 STUDY = Study(
     question="How many goals does each model solve, with the paper's search and with "
     "the tree search?",
     plan=_plan,
+    claims=(
+        Claim(
+            "with the paper's search SAIN solves more hard goals than IN",
+            solves_more("sain", "in", "hard, greedy"),
+        ),
+    ),
     published=PUBLISHED_SIMULATED_CONTROL,
 )

@@ -1,9 +1,8 @@
 """Steps of studies: frozen settings and inputs, whose hash names the run folder."""
 
 import abc
-from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -40,9 +39,9 @@ class Step(abc.ABC, Generic[T]):
     """A piece of work: equal settings and inputs make one step, run once."""
 
     @property
-    @abc.abstractmethod
     def name(self) -> str:
-        """What the step makes, for progress and the name of its folder."""
+        """The beginning of the name of the run folder."""
+        return type(self).__name__.lower()
 
     @abc.abstractmethod
     def run(self, runner: "Runner") -> T:
@@ -70,26 +69,19 @@ class Step(abc.ABC, Generic[T]):
         return "-".join([*words.split(), self.key])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Given(Step[Store]):
     """Pushes that exist before the study begins."""
 
-    store: Store = field(repr=False)
-    content: str  # hash of the pushes
+    store: Store
 
-    @property
-    def name(self) -> str:
-        """The folder of the dataset."""
-        return str(self.store.path)
+    def __repr__(self) -> str:
+        """Return the hash of the pushes, wherever they are stored."""
+        return f"Given({self.store.content})"
 
     def run(self, runner: "Runner") -> Store:
         """Return the pushes."""
         return self.store
-
-
-def given(store: Store) -> Given:
-    """Return existing pushes as a step."""
-    return Given(store, store.content)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +113,6 @@ class First(Step[Store]):
 
     pushes: Step[Store]
     count: int
-
-    @property
-    def name(self) -> str:
-        """How many of which."""
-        return f"{self.count} of {self.pushes.name}"
 
     def run(self, runner: "Runner") -> Store:
         """Return the pushes."""
@@ -159,11 +146,6 @@ class Load(Step[Model]):
     source: str  # name of the model
     engine: str | None = None  # inside; None: its own
 
-    @property
-    def name(self) -> str:
-        """The name in tables."""
-        return self.id.slug
-
     def run(self, runner: "Runner") -> Model:
         """Return the model."""
         return replace(load_model(self.source, engine=self.engine), id=self.id)
@@ -175,11 +157,6 @@ class Identify(Step[Model]):
 
     id: ModelId
     pushes: Step[Store]
-
-    @property
-    def name(self) -> str:
-        """The name in tables."""
-        return self.id.slug
 
     def run(self, runner: "Runner") -> Model:
         """Return the model, identified where that is unfinished."""
@@ -252,24 +229,16 @@ class Evaluate(Step[Measurements]):
     condition: Condition | None = None
     steps: int | None = None  # as of `evaluate`
 
-    @property
-    def name(self) -> str:
-        """The pushes."""
-        return self.pushes.name
-
     def run(self, runner: "Runner") -> Measurements:
         """Return the errors."""
         store = runner.result(self.pushes)
         models = [runner.result(model) for model in self.models]
-        runs: Counter[ModelId] = Counter()
         pools: dict[ModelId, list[str]] = {}
         for number, model in enumerate(models):
-            runs[model.id] += 1
-            name = f"{model.name}, training run {runs[model.id]}"
-            if [each.id for each in models].count(model.id) > 1:
-                own = structs.replace(model.id, name=name)
-                models[number] = replace(model, id=own)
-                pools.setdefault(model.id, []).append(name)
+            runs = pools.setdefault(model.id, [])
+            runs.append(f"{model.name}, run {len(runs) + 1}")
+            own = structs.replace(model.id, name=runs[-1])
+            models[number] = replace(model, id=own)
         with runner.bar("Predicting", len(models) * store.info.pushes) as bar:
             found = evaluate(
                 models,
@@ -321,11 +290,6 @@ class Join(Step[Measurements]):
     """Measurements of several conditions."""
 
     parts: tuple[Step[Measurements], ...]
-
-    @property
-    def name(self) -> str:
-        """The number of conditions."""
-        return f"{len(self.parts)} conditions"
 
     def run(self, runner: "Runner") -> Measurements:
         """Return the measurements of all parts, one after another."""

@@ -20,7 +20,7 @@ from sainet.runs.documents import write_bytes, write_document, write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST, manifest
-from sainet.studies.config import Scale
+from sainet.studies import Scale
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Step, Train
 
@@ -56,12 +56,20 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     scores: dict[str, float] | None = None  # by robot
 
 
+class Ruling(msgspec.Struct, frozen=True):
+    """A claim and its verdict."""
+
+    claim: str
+    status: str
+
+
 class Result(msgspec.Struct, frozen=True, kw_only=True):
     """The result of a study, as it is kept in its folder."""
 
     summary: Summary
     as_trained: Summary | None = None  # of pushes like those of the training
     choices: tuple[Choice, ...] = ()
+    claims: tuple[Ruling, ...] = ()
 
     def to_json(self) -> Mapping[str, object]:
         """Return the JSON object that commands print."""
@@ -70,6 +78,8 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
             found["as_trained"] = to_json_object(self.as_trained)
         if self.choices:
             found["choices"] = msgspec.to_builtins(self.choices)
+        if self.claims:
+            found["claims"] = msgspec.to_builtins(self.claims)
         return found
 
 
@@ -149,9 +159,8 @@ class Study:
     def summarise(self, measured: Measurements) -> Summary:
         """Return the summary of measurements of this study."""
         found = summarise(measured, subject=self.subject)
-        return (
-            found if self.compares else msgspec.structs.replace(found, comparisons=())
-        )
+        kept = found.comparisons if self.compares else ()
+        return msgspec.structs.replace(found, comparisons=kept)
 
     def run(self, scope: Scope, runner: Runner, out: Path) -> Result:
         """Run the steps and write table, measurements, figures and origin.
@@ -170,7 +179,12 @@ class Study:
             found.write(out / "as-trained.nc")
             as_trained = self.summarise(found)
         result = Result(
-            summary=summary, as_trained=as_trained, choices=self.choose(summary)
+            summary=summary,
+            as_trained=as_trained,
+            choices=self.choose(summary),
+            claims=tuple(
+                Ruling(claim.text, claim.rule(summary).status) for claim in self.claims
+            ),
         )
         if self.figure is not None:
             self.figure(summary, out / self.figure_name)

@@ -3,6 +3,7 @@
 import numpy as np
 from msgspec import structs
 
+from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.learning.recipes import SingleSteps
@@ -61,6 +62,13 @@ def score(summary: Summary, where: str = "") -> float:
 RECURRENT_OR_NOT = Study(
     question="Is training on whole pushes better than on single steps (figure 2)?",
     plan=_recurrent_or_not,
+    claims=tuple(
+        Claim(
+            f"{kind.upper()} trained on whole pushes errs less than on single steps",
+            errs_less(kind, f"{kind}-single-steps"),
+        )
+        for kind in ("in", "sain")
+    ),
 )
 REGULARISATION = Study(
     question="Which l2 should networks be trained with?",

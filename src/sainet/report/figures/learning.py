@@ -1,6 +1,6 @@
 """The learning curve of a network."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from scipy.ndimage import uniform_filter1d
 
+from sainet.learning.log import LogLine
 from sainet.report.figures.canvas import (
     LineLook,
     add_grid,
@@ -91,3 +92,22 @@ def _end(history: History) -> tuple[float, float] | None:
     if len(training):
         return float(iterations[-1]), float(running_mean(training)[-1])
     return None
+
+
+def draw_history(model: str, log: Sequence[LogLine], path: Path) -> Path:
+    """Draw the loss of training and, where it was measured, of validation.
+
+    Args:
+        model: slug of the network, whose label stands beside the curve. Equal logs of
+            one model give the same bytes, whatever folder the training wrote.
+        log: the lines of the training log.
+        path: file to write; ``.svg`` or ``.png``.
+    """
+    checked = [line for line in log if line.validation_loss is not None]
+    history = (
+        np.array([line.iteration for line in log]),
+        np.array([line.loss for line in log]),
+        np.array([line.iteration for line in checked]),
+        np.array([line.validation_loss for line in checked]),
+    )
+    return draw_learning_curve({model: history}, path)
