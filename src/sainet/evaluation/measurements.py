@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -185,11 +184,15 @@ class Measurements:
             places: number of the condition of each sample.
         """
         data = self.data.assign_coords(condition=("sample", places.astype(np.int32)))
-        return Measurements(data, _with(self.header, conditions=conditions))
+        return Measurements(
+            data, msgspec.structs.replace(self.header, conditions=conditions)
+        )
 
     def with_published(self, published: tuple[PublishedValues, ...]) -> "Measurements":
         """Return the same measurements with published values beside them."""
-        return replace(self, header=_with(self.header, published=published))
+        return replace(
+            self, header=msgspec.structs.replace(self.header, published=published)
+        )
 
     def compact(self) -> "Measurements":
         """Return measurements of published precision: about four digits each."""
@@ -263,10 +266,6 @@ def _unpack(packed: bytes) -> bytes:
     if not unpacker.eof:
         raise ValueError(f"cut off, or over {_LARGEST} bytes")
     return data
-
-
-def _with(header: Header, **changes: Any) -> Header:  # noqa: ANN401
-    return msgspec.structs.replace(header, **changes)
 
 
 def _rounded(values: xr.DataArray) -> xr.DataArray:

@@ -44,8 +44,8 @@ def arrange(summary: Summary) -> Table:
     """Return the table of a summary; columns without any number are left out."""
     if summary.is_of_trials:
         return _arrange_trials(summary)
-    every, notes = _without_twins([*_measured(summary)], summary)
-    theirs = [*_predicted(summary), *_published(summary)]
+    every, notes = _without_twins(_by_line(summary, summary.rows), summary)
+    theirs = [*_by_line(summary, summary.predictions), *_published(summary)]
     metrics = _used(every, theirs)
     bodies = tuple(
         sorted({body for values in every + theirs for body in values.bodies})
@@ -62,15 +62,7 @@ def arrange(summary: Summary) -> Table:
     )
 
 
-def _measured(summary: Summary) -> Iterator[_Values]:
-    return _by_line(summary, summary.rows)
-
-
-def _predicted(summary: Summary) -> Iterator[_Values]:
-    return _by_line(summary, summary.predictions)
-
-
-def _by_line(summary: Summary, rows: Iterable[Row]) -> Iterator[_Values]:
+def _by_line(summary: Summary, rows: Iterable[Row]) -> list[_Values]:
     models = {model.slug: model for model in summary.models}
     found: dict[tuple[str, str], _Values] = {}
     for row in rows:
@@ -80,9 +72,7 @@ def _by_line(summary: Summary, rows: Iterable[Row]) -> Iterator[_Values]:
             found[place] = _Values(row.condition, model, {}, row.count, row.trainings)
         found[place].bodies[row.body] = row.values
     order = [condition.label for condition in summary.conditions]
-    return iter(
-        sorted(found.values(), key=lambda values: order.index(values.condition))
-    )
+    return sorted(found.values(), key=lambda values: order.index(values.condition))
 
 
 def _published(summary: Summary) -> Iterator[_Values]:

@@ -5,7 +5,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -53,7 +52,7 @@ class Report:
     figures: Sequence[tuple[Path | str, str]] = ()
     replays: Sequence[Replay] = ()
     episodes: Sequence[EpisodeRecord] = ()
-    manifest: Mapping[str, Any] = field(default_factory=dict)
+    manifest: Mapping[str, object] = field(default_factory=dict)
     commands: Sequence[str] = ()
 
 
@@ -82,7 +81,7 @@ def to_page(report: Report) -> str:
     )
 
 
-def replay_data(replay: Replay) -> dict[str, Any]:
+def replay_data(replay: Replay) -> dict[str, object]:
     """Return a replay as JSON values for the script of the page (mm, rad, s)."""
     styles = styles_of(replay.tracks)
     reference = replay.reference
@@ -199,7 +198,9 @@ def _at_reading_size(opening: re.Match[str]) -> str:
     return f'<svg style="max-width: {width:.0f}px"{opening[1]} width="{opening[2]}pt"'
 
 
-def _flatten(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+def _flatten(
+    values: Mapping[str, object], prefix: str = ""
+) -> Iterator[tuple[str, str]]:
     for name, value in values.items():
         if isinstance(value, Mapping):
             yield from _flatten(value, f"{prefix}{name} · ")

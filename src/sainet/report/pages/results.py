@@ -6,7 +6,6 @@ Prose stands in the templates in ``docs/templates``, which set their titles; num
 come from measurements.
 """
 
-import re
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -231,30 +230,6 @@ def with_block(text: str, block: str) -> str:
     if not (begin and end):
         raise ValueError(f"no {BEGIN.strip()} before {END}")
     return before + begin + block + end + after
-
-
-# What may hold digits outside of rendered text: code, links, versions, years, tables
-# and figures of the paper, and names of disks.
-_EXEMPT = (
-    r"```.*?```",
-    r"`[^`\n]*`",
-    r"\]\([^)]*\)",
-    r"Python \d+\.\d+",
-    r"\b(ICRA|Ajay et al\.,?) \(?\d{4}\)?",
-    r"\bl2\b",
-    r"\b([Dd]isks?|[Ff]igure|section|Apache-)\s?\d+(\.\d+)?[a-z]?",
-    r"arXiv:[\d.]+",
-    r"examples/\w+",
-    r"<img[^>]*>",
-)
-
-
-def numbers_in(text: str) -> list[str]:
-    """Return the lines of a text that state a number outside of rendered blocks."""
-    rendered = re.escape(BEGIN) + ".*?" + re.escape(END)
-    for pattern in (rendered, *_EXEMPT):
-        text = re.sub(pattern, "", text, flags=re.DOTALL)
-    return [line for line in text.splitlines() if re.search(r"\d", line)]
 
 
 def draw_figures(root: Path) -> None:
