@@ -12,8 +12,9 @@ from models.samples import Glide
 from planning.scenes import FEW, goal_ahead, scene, touching
 from sainet.control.episode import Episode, checked, distances, run_episode
 from sainet.models.dynamics import PhysicsDynamics
-from sainet.planning.base import AbstractPlanner, Found, Plan
+from sainet.planning.base import AbstractPlanner, Plan
 from sainet.planning.greedy import GreedyPlanner
+from sainet.planning.levels import Found
 from sainet.robots.base import AbstractRobot
 from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import Push, PushGrid
@@ -28,7 +29,7 @@ class Ahead(AbstractPlanner):
 
     actions: PushGrid = PushGrid()
 
-    def search(self, dynamics, task, scene, state):
+    def search(self, problem):
         return Found((0,), 0.0, 0.0, 1)
 
     def plan(self, dynamics, task, scene, state):

@@ -19,7 +19,7 @@ from sainet.planning import PLANNERS, make_planner
 from sainet.planning import tree as tree_module
 from sainet.planning.checks import doubts_of_training
 from sainet.planning.greedy import GreedyPlanner
-from sainet.planning.levels import Level, flatten
+from sainet.planning.levels import Level, Problem
 from sainet.planning.outcomes import every_push, roll_pushes
 from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
@@ -103,6 +103,10 @@ def test_near_the_goal_the_best_sequences_get_a_third_push():
     assert narrow.plan(PHYSICS, NEAR, SCENE, STATE).looked_at == 6 + 36 + 24
 
 
+def problem(task):
+    return Problem(PHYSICS, task, SCENE, STATE, FEW)
+
+
 @every_planner
 def test_one_sufficient_push_is_the_plan(name):
     push = jax.tree.map(lambda x: x[20], PushGrid().pushes())
@@ -130,7 +134,7 @@ def test_equal_decisions_give_equal_plans(name):
 
 
 def test_the_greedy_search_follows_the_heuristic():
-    found = GreedyPlanner(actions=FEW).search(PHYSICS, FAR, SCENE, STATE)
+    found = GreedyPlanner(actions=FEW).search(problem(FAR))
     ends = {s: float(FAR.cost(end)) for s, end in naive_ends(1).items() if s}
     first = min(ends, key=ends.__getitem__)
     assert found.actions[:1] == first
@@ -140,7 +144,7 @@ def test_the_greedy_search_follows_the_heuristic():
 
 def test_the_greedy_horizon_is_three_near_the_goal():
     planner = GreedyPlanner(actions=FEW, expansions=1 + 6 + 36)  # all there are
-    found = planner.search(PHYSICS, NEAR, SCENE, STATE)
+    found = planner.search(problem(NEAR))
     assert len(found.actions) == 3
     assert found.is_complete
     ends = naive_ends(3)
@@ -150,14 +154,14 @@ def test_the_greedy_horizon_is_three_near_the_goal():
 @pytest.mark.parametrize("most", [0, 1])
 def test_the_greedy_search_stops_after_its_expansions(most):
     planner = GreedyPlanner(actions=FEW, expansions=most)
-    found = planner.search(PHYSICS, FAR, SCENE, STATE)
+    found = planner.search(problem(FAR))
     assert (found.looked_at, found.is_complete) == (6 + 6 * most, False)
     assert found.cost <= min(float(FAR.cost(e)) for e in naive_ends(1).values()) + 1e-6
 
 
 def test_an_empty_queue_ends_with_the_best_sequence():
     planner = GreedyPlanner(actions=FEW, same=10.0)  # every state is the first one
-    found = planner.search(PHYSICS, FAR, SCENE, STATE)
+    found = planner.search(problem(FAR))
     assert len(found.actions) == 1
     assert not found.is_complete
 
@@ -187,7 +191,7 @@ def test_a_deadline_expands_the_best_first_pushes(
 
     monkeypatch.setattr(Level, "grow", spied)
     planner = TreePlanner(actions=FEW, deadline=5.0, block=2)
-    found = planner.search(PHYSICS, task, SCENE, STATE)
+    found = planner.search(problem(task))
     assert (found.looked_at, found.is_complete) == (6 + 4 * 6, False)
     costs = {s[0]: float(task.cost(end)) for s, end in naive_ends(1).items() if s}
     assert grown == sorted(costs, key=costs.__getitem__)[:4]
@@ -225,14 +229,10 @@ def test_pushes_inside_a_disk_and_their_sequences_are_excluded():
     grid = jax.device_get(FEW.pushes())
     chain, state = behind(grid.contact_angle.max())
     blocked = grid.contact_angle == grid.contact_angle.max()
-    root = jax.tree.map(lambda x: np.asarray(x)[None], state)
-
-    def expand(states):
-        return every_push(PHYSICS, FAR, chain, states, grid)
-
-    first = flatten(expand(root), np.zeros((1, 0), int))
+    of_chain = Problem(PHYSICS, FAR, chain, state, FEW)
+    first = of_chain.first_level()
     np.testing.assert_array_equal(np.isinf(first.cost), blocked)
-    second = first.grow(np.arange(6), expand)
+    second = first.grow(np.arange(6), of_chain)
     assert not np.isfinite(second.cost[blocked[second.actions].any(axis=1)]).any()
     assert np.isfinite(second.cost).any()
 

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.checks import check_model, check_observation, doubts
+from sainet.planning.levels import Found, Problem
 from sainet.planning.outcomes import batch_of, roll_pushes
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
@@ -44,9 +45,7 @@ class AbstractPlanner(eqx.Module):
     actions: eqx.AbstractVar[PushGrid]
 
     @abstractmethod
-    def search(
-        self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
-    ) -> "Found":
+    def search(self, problem: Problem) -> Found:
         """Return the best sequence of actions, as indices into the grid."""
 
     def plan(
@@ -68,9 +67,11 @@ class AbstractPlanner(eqx.Module):
         """
         check_model(dynamics, scene)
         gap = check_observation(scene, state)
-        found = self.search(dynamics, task, scene, state)
-        grid = jax.device_get(self.actions.pushes())
-        pushes = tuple(jax.tree.map(lambda x, i=i: x[i], grid) for i in found.actions)
+        problem = Problem(dynamics, task, scene, state, self.actions)
+        found = self.search(problem)
+        pushes = tuple(
+            jax.tree.map(lambda x, i=i: x[i], problem.pushes) for i in found.actions
+        )
         return Plan(
             pushes=pushes,
             predict=partial(predicted_path, dynamics, scene, state, pushes),
@@ -80,17 +81,6 @@ class AbstractPlanner(eqx.Module):
             is_complete=found.is_complete,
             warnings=tuple(doubts(dynamics, gap, pushes)),
         )
-
-
-@dataclass(frozen=True)
-class Found:
-    """The sequence of actions that a search selects."""
-
-    actions: tuple[int, ...]
-    cost: float
-    distance: float  # m
-    looked_at: int
-    is_complete: bool = True
 
 
 def predicted_path(

@@ -4,19 +4,11 @@ from heapq import heappop, heappush
 from itertools import count
 
 import equinox as eqx
-import jax
 import numpy as np
 
-from sainet.models.dynamics import AbstractDynamics
-from sainet.planning.base import AbstractPlanner, Found
-from sainet.planning.levels import Level, choose, flatten
-from sainet.planning.outcomes import Outcomes, every_push
+from sainet.planning.base import AbstractPlanner
+from sainet.planning.levels import Found, Level, Problem, choose
 from sainet.scenes.pushes import PushGrid
-from sainet.scenes.scene import Scene
-from sainet.scenes.state import State
-from sainet.tasks.base import AbstractTask
-
-_NEAR = 0.010  # m
 
 
 class GreedyPlanner(AbstractPlanner):
@@ -36,20 +28,11 @@ class GreedyPlanner(AbstractPlanner):
     same: float = eqx.field(static=True, default=1e-3)  # m, below which states equal
     expansions: int = eqx.field(static=True, default=12)  # maximum, after the first
 
-    def search(
-        self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
-    ) -> Found:
+    def search(self, problem: Problem) -> Found:
         """Return the sequence selected by the queue."""
-        pushes = jax.device_get(self.actions.pushes())
-
-        def expand(states: State) -> Outcomes:
-            return every_push(dynamics, task, scene, states, pushes)
-
-        near = float(task.distance(state)) < _NEAR
-        horizon = self.near_horizon if near else self.horizon
-        root = jax.tree.map(lambda x: np.asarray(x)[None], state)
-        levels = [flatten(expand(root), np.zeros((1, 0), int))]
-        queue = _Queue(self.same, np.asarray(state.position))
+        horizon = self.near_horizon if problem.is_near else self.horizon
+        levels = [problem.first_level()]
+        queue = _Queue(self.same, np.asarray(problem.state.position))
         queue.add(levels[0])
         while queue and len(levels) <= self.expansions:
             if levels[-1].outcomes.solved.any():
@@ -57,7 +40,7 @@ class GreedyPlanner(AbstractPlanner):
             level, row = queue.pop()
             if level.actions.shape[1] == horizon:
                 return level.found(row, sum(len(v.actions) for v in levels))
-            levels.append(level.grow(np.array([row]), expand))
+            levels.append(level.grow(np.array([row]), problem))
             queue.add(levels[-1])
         return choose(levels, is_complete=False)
 

@@ -1,18 +1,63 @@
 """Levels: sequences of one length with their outcomes, which a search selects from."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.planning.base import Found
-from sainet.planning.outcomes import Outcomes
+from sainet.models.dynamics import AbstractDynamics
+from sainet.planning.outcomes import Outcomes, every_push
 from sainet.runs.errors import Diverged
+from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
+from sainet.tasks.base import AbstractTask
 
-Expand = Callable[[State], Outcomes]
+_NEAR = 0.010  # m, distance to the goal below which longer sequences are searched
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a search starts from: model, task, scene, state and candidate pushes."""
+
+    dynamics: AbstractDynamics
+    task: AbstractTask
+    scene: Scene  # without a batch axis
+    state: State  # observed, at rest
+    grid: PushGrid
+
+    @cached_property
+    def pushes(self) -> Push:
+        """The candidate pushes, on the host."""
+        return jax.device_get(self.grid.pushes())
+
+    @property
+    def is_near(self) -> bool:
+        """Whether the goal is within 10 mm (as in the paper)."""
+        return float(self.task.distance(self.state)) < _NEAR
+
+    def expand(self, states: State) -> Outcomes:
+        """Return the outcomes of every push from every state."""
+        return every_push(self.dynamics, self.task, self.scene, states, self.pushes)
+
+    def first_level(self) -> "Level":
+        """Return the sequences of one push."""
+        root = jax.tree.map(lambda x: np.asarray(x)[None], self.state)
+        return flatten(self.expand(root), np.zeros((1, 0), int))
+
+
+@dataclass(frozen=True)
+class Found:
+    """The sequence of actions that a search selects."""
+
+    actions: tuple[int, ...]
+    cost: float
+    distance: float  # m
+    looked_at: int
+    is_complete: bool = True
 
 
 @dataclass(frozen=True)
@@ -31,10 +76,10 @@ class Level:
         """Return the rows of least cost, in order of cost."""
         return np.argsort(self.cost, kind="stable")[:count]
 
-    def grow(self, rows: Int[np.ndarray, " row"], expand: Expand) -> "Level":
+    def grow(self, rows: Int[np.ndarray, " row"], problem: Problem) -> "Level":
         """Return some sequences, extended by every push."""
         states = jax.tree.map(lambda x: x[rows], self.outcomes.state)
-        found, possible = expand(states), np.isfinite(self.cost[rows])[:, None]
+        found, possible = problem.expand(states), np.isfinite(self.cost[rows])[:, None]
         # No push follows an infeasible push.
         cost, solved = np.where(possible, found.cost, np.inf), found.solved & possible
         found = found._replace(cost=cost, solved=solved)

@@ -1,21 +1,15 @@
 """The full tree: every sequence of two pushes, in two fused calls."""
 
 import time
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
 import numpy as np
 
-from sainet.models.dynamics import AbstractDynamics
-from sainet.planning.base import AbstractPlanner, Found
-from sainet.planning.levels import Expand, Level, choose, flatten
-from sainet.planning.outcomes import Outcomes, every_push
+from sainet.planning.base import AbstractPlanner
+from sainet.planning.levels import Found, Level, Problem, choose
 from sainet.scenes.pushes import PushGrid
-from sainet.scenes.scene import Scene
-from sainet.scenes.state import State
-from sainet.tasks.base import AbstractTask
-
-_NEAR = 0.010  # m, distance below which third pushes are predicted (as in the paper)
 
 
 class TreePlanner(AbstractPlanner):
@@ -30,31 +24,23 @@ class TreePlanner(AbstractPlanner):
     deadline: float | None = eqx.field(static=True, default=None)  # s
     block: int = eqx.field(static=True, default=12)  # first pushes per deadline check
 
-    def search(
-        self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
-    ) -> Found:
+    def search(self, problem: Problem) -> Found:
         """Return the best sequence of one, two or, near the goal, three pushes."""
-        late, pushes = self._clock(), jax.device_get(self.actions.pushes())
-
-        def expand(states: State) -> Outcomes:
-            return every_push(dynamics, task, scene, states, pushes)
-
-        root = jax.tree.map(lambda x: np.asarray(x)[None], state)
-        levels = [flatten(expand(root), np.zeros((1, 0), int))]
+        late, levels = self._clock(), [problem.first_level()]
         # Expand the most promising first pushes first: a deadline may end the search.
         order = levels[0].cheapest(len(levels[0].actions))
         blocks = [order] if self.deadline is None else self._blocks(order)
         for block in blocks:
             if late():
                 return choose(levels, is_complete=False)
-            levels.append(levels[0].grow(block, expand))
-        if float(task.distance(state)) < _NEAR:
+            levels.append(levels[0].grow(block, problem))
+        if problem.is_near:
             if late():
                 return choose(levels, is_complete=False)
-            levels.append(self._third(levels[1:], expand))
+            levels.append(self._third(levels[1:], problem))
         return choose(levels)
 
-    def _clock(self):  # noqa: ANN202
+    def _clock(self) -> Callable[[], bool]:
         """Return a function that returns whether the deadline has passed."""
         end = time.perf_counter() + (self.deadline or np.inf)
         return lambda: time.perf_counter() > end
@@ -63,10 +49,10 @@ class TreePlanner(AbstractPlanner):
         count = -(-len(order) // self.block)
         return np.split(np.resize(order, count * self.block), count)
 
-    def _third(self, levels: list[Level], expand: Expand) -> Level:
+    def _third(self, levels: list[Level], problem: Problem) -> Level:
         """Return the best sequences of two, extended by every third push."""
         joined = Level(
             jax.tree.map(lambda *x: np.concatenate(x), *(v.outcomes for v in levels)),
             np.concatenate([level.actions for level in levels]),
         )
-        return joined.grow(joined.cheapest(self.beam), expand)
+        return joined.grow(joined.cheapest(self.beam), problem)

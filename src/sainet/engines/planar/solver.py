@@ -9,7 +9,7 @@ solved, which contains all contacts: the cost grows with the number of bodies in
 its square.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -27,6 +27,8 @@ from sainet.engines.planar.contact import (
     solve_contact,
     solve_table,
 )
+
+_Carry = tuple[Any, Any, Any]  # twists, table impulses and contact impulses
 
 
 class Step(NamedTuple):
@@ -53,7 +55,7 @@ def solve_all_pairs(
     zero = jnp.zeros_like(bodies.x[0])
     disks = range(len(limits))
 
-    def sweep(_: Array, carry: tuple) -> tuple:
+    def sweep(_: Array, carry: _Carry) -> _Carry:
         twists, table, touching = (list(part) for part in carry)
         for disk in disks:
             table[disk], twists[disk] = solve_table(
@@ -146,7 +148,7 @@ def solve_close_pairs(
     limit = jnp.stack(limits)
     disks = slice(0, len(limits))
 
-    def sweep(_: Array, carry: tuple) -> tuple:
+    def sweep(_: Array, carry: _Carry) -> _Carry:
         twist, table, touching = carry
         table, moved = solve_table(
             table,
