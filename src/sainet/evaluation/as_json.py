@@ -1,5 +1,9 @@
 """Summaries as the JSON objects that commands print with ``--json``."""
 
+from collections.abc import Mapping
+
+import msgspec
+
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 
@@ -11,8 +15,8 @@ def to_json_object(summary: Summary) -> Json:
     if summary.is_of_trials:
         worlds = {c.label: c.factors.get("world") for c in summary.conditions}
         return {
-            "rows": [_trial_row(row, worlds[row.condition]) for row in summary.trials],
-            "pairs": [_test(each, worlds[each.condition]) for each in summary.tests],
+            "rows": [_of_world(row, worlds) for row in summary.trials],
+            "pairs": [_of_world(test, worlds) for test in summary.tests],
             "published": [
                 {
                     "group": each.condition,
@@ -76,18 +80,10 @@ def _published(summary: Summary) -> list[Json]:
     ]
 
 
-def _trial_row(row: TrialRow, world: object) -> Json:
-    return {"group": row.condition, "world": world, "model": row.model} | row.to_dict()
-
-
-def _test(test: TrialTest, world: object) -> Json:
-    return {
-        "group": test.condition,
-        "world": world,
-        "measure": test.measure,
-        "model": test.model,
-        "against": test.against,
-        "only_one": test.only_one,
-        "only_other": test.only_other,
-        "p": test.p,
-    }
+def _of_world(
+    found: TrialRow | TrialTest, worlds: Mapping[str, float | str | None]
+) -> Json:
+    """Return every field, beginning with the condition and its world."""
+    fields: Json = msgspec.to_builtins(found)
+    del fields["condition"]
+    return {"group": found.condition, "world": worlds[found.condition], **fields}
