@@ -6,7 +6,7 @@ import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
-from sainet.datasets.batch import to_batch, to_controls, to_initial
+from sainet.datasets.batch import to_batch, to_initial
 from sainet.learning import fit as fit_module
 from sainet.learning.fit import fit
 from sainet.learning.held import predict_batch
@@ -263,7 +263,7 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     moved = np.asarray(batch.initial.pusher_position) - arrays["initial_pusher"]
     np.testing.assert_allclose(moved, [[1.5e-3, 0]] * 4, atol=1e-7)
     # What training predicts is what the model does with what was recorded.
-    controls = to_controls(arrays, store.info, slice(12))
+    controls = to_batch(arrays, store.info, steps=12).controls
     found = predict(model, batch.scene, to_initial(arrays), controls)
     local = path_to_frame(
         pack_motion(found.states), push_frame(batch.scene, batch.initial)
