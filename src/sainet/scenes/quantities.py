@@ -124,7 +124,6 @@ Mass = Annotated[float, MASS.meta]  # kg
 Radius = Annotated[float, RADIUS.meta]  # m
 Friction = Annotated[float, FRICTION.meta]
 PressureRatio = Annotated[float, PRESSURE_RATIO.meta]
-OffsetMm = Annotated[float, CAMERA_OFFSET.meta]  # mm
 TimeStep = Annotated[float, TIME_STEP_RANGE.meta]  # s
 
 Finite = Annotated[float, msgspec.Meta(ge=-1e9, le=1e9)]  # of any quantity
