@@ -73,12 +73,12 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
         return "" if is_usual else self.simulator.engine
 
     def _engine_label(self) -> str:
-        return _SIMULATOR_PARTS.get(self._simulator_part(), "")
+        part = self._simulator_part()
+        return _ENGINE_LABELS.get(part, f" around {part.capitalize()}")
 
 
-_SIMULATOR_PARTS = {
+_ENGINE_LABELS = {
     "": "",
     "true": ", true properties",
     "identified": ", identified",
-    "bullet": " around Bullet",
 }

@@ -10,7 +10,10 @@ from jaxtyping import UInt64
 
 from sainet.engines import RECORDED
 from sainet.engines.simulator import (
+    PAPER,
     SIMULATORS,
+    TRUE_PROPERTIES,
+    Assumptions,
     InternalEngine,
     PlanarSpec,
     SimulatorSpec,
@@ -99,10 +102,10 @@ class Model:
             )
 
 
-# Simulators by the names of physics models, for each engine.
-PHYSICS: Mapping[str, Mapping[str, str]] = {
-    "physics": {"planar": "planar", "bullet": "bullet"},
-    "physics-true": {"planar": "planar-true", "bullet": "bullet-true"},
+# What the engine of each physics model assumes; it may be any engine of `SIMULATORS`.
+PHYSICS: Mapping[str, Assumptions] = {
+    "physics": PAPER,
+    "physics-true": TRUE_PROPERTIES,
 }
 PRETRAINED = Path(__file__).parent / "pretrained"
 OF_PAPER = ("in", "sain", "sain-bullet")
@@ -183,14 +186,24 @@ def _called(identity: ModelId, name: str) -> ModelId:
     return msgspec.structs.replace(identity, name=name)
 
 
-def _physics(name: str, engine: str) -> Model:
-    known = PHYSICS[name]
+def physics_simulator(name: str, engine: str) -> SimulatorSpec:
+    """Return the simulator of a physics model: the engine with the model's assumptions.
+
+    Raises:
+        UnknownName: no simulator combines them.
+    """
+    assumed, each = PHYSICS[name], SIMULATORS.values()
+    known = {spec.engine: spec for spec in each if spec.assumptions == assumed}
     if engine not in known:
         raise unknown_name("engine", engine, known)
-    simulator = simulator_named(known[engine])
+    return known[engine]
+
+
+def _physics(name: str, engine: str) -> Model:
+    simulator = physics_simulator(name, engine)
     identity = ModelId(kind="physics", simulator=simulator)
-    dynamics = PhysicsDynamics(simulator.build())
-    return Model(identity, dynamics, internal=InternalEngine(simulator))
+    internal = InternalEngine(simulator)
+    return Model(identity, PhysicsDynamics(simulator.build()), internal=internal)
 
 
 def _identified_physics(folder: Path, engine: str | None) -> Model:

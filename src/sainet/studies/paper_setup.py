@@ -11,7 +11,7 @@ from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import FINE_TUNING, PAPER, Recipe
 from sainet.models.identity import ModelId
-from sainet.models.library import PHYSICS
+from sainet.models.library import PHYSICS, physics_simulator
 from sainet.studies import Scale
 from sainet.studies.steps import (
     Evaluate,
@@ -154,8 +154,12 @@ class PaperSetup:
 def physics(engine: str = "planar") -> tuple[Load, ...]:
     """Return both physics models: assumed properties, and true masses and radii."""
     return tuple(
-        Load(ModelId(kind="physics", simulator=SIMULATORS[names[engine]]), name, engine)
-        for name, names in PHYSICS.items()
+        Load(
+            ModelId(kind="physics", simulator=physics_simulator(name, engine)),
+            name,
+            engine,
+        )
+        for name in PHYSICS
     )
 
 
