@@ -1,8 +1,11 @@
 """What commands print stays as it is: paths are not markup, commands are not broken."""
 
+from contextlib import contextmanager
+
 import pytest
 
-from sainet.cli.output import Output, Pace, progress_bar
+from sainet.cli.output import Bars, Output, Pace, progress_bar
+from sainet.studies.runner import Progress
 
 PATH = "runs/[test]/[/test]/" + "a" * 80
 
@@ -12,8 +15,6 @@ def test_a_path_is_printed_unchanged_on_one_line(capsys):
     assert capsys.readouterr().out == f"Open {PATH} in a browser.\n"
     Output(json=True).say(PATH)
     assert capsys.readouterr() == ("", f"{PATH}\n")
-    Output().say("[bold]1[/] Simulating.", markup=True)
-    assert capsys.readouterr().out == "1 Simulating.\n"
 
 
 def test_quiet_prints_only_warnings(capsys):
@@ -64,3 +65,28 @@ def test_a_finished_bar_is_full_and_compiles_no_more(amounts, capsys, monkeypatc
     shown = capsys.readouterr().err
     assert "2/2" in shown
     assert "compiling" not in shown
+
+
+def test_each_step_has_a_bar_of_its_own_that_counts_to_its_end(monkeypatch):
+    seen = []
+
+    @contextmanager
+    def bar(title, total, output):
+        done = [0]
+
+        def advance(amount, note=""):
+            done[0] += amount
+
+        try:
+            yield advance
+        finally:
+            seen.append((title, total, *done))
+
+    monkeypatch.setattr("sainet.cli.output.progress_bar", bar)
+    with Bars(Output(quiet=True)) as bars:
+        for title in ("Simulating", "Training"):
+            for done in (0, 2, 5):
+                bars(Progress(title, done, 5))
+            bars(Progress(title, 5, 5, has_ended=True))
+        bars(Progress("Predicting", 1, 3))
+    assert seen == [("Simulating", 5, 5), ("Training", 5, 5), ("Predicting", 3, 1)]

@@ -38,15 +38,14 @@ class Output:
 
         return Console(stderr=self.json, highlight=False)
 
-    def say(self, text: str, *, markup: bool = False) -> None:
+    def say(self, text: str) -> None:
         """Print a line about the progress, unless quiet.
 
         Args:
             text: a line; it is not wrapped, because it may contain a command to copy.
-            markup: whether brackets are Rich's markup; in a path they are text.
         """
         if not self.quiet:
-            self.console.print(text, markup=markup, soft_wrap=True)
+            self.console.print(text, markup=False, soft_wrap=True)
 
     def warn(self, text: str) -> None:
         """Print a warning, even when quiet."""

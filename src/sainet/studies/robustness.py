@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,17 +9,13 @@ import numpy as np
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
-from sainet.datasets.writer import derive
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.scenes.geometry import wrap_angle
 from sainet.studies.paper_setup import NETWORKS, PaperSetup
 from sainet.studies.paper_tables import SEEDS
-from sainet.studies.steps import Join, Step
+from sainet.studies.steps import Derive, Join, Step
 from sainet.studies.study import Plan, Scope, Study
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
 
 PERCENT_WRONG = (2, 5, 10)
 SPEEDS_MM_S = (25.0, 100.0)
@@ -31,10 +26,9 @@ _SEED = 11
 
 
 @dataclass(frozen=True, eq=False)
-class WrongProperties(Step[Store]):
+class WrongProperties(Derive):
     """The same pushes with every mass and radius too large or too small."""
 
-    pushes: Step[Store]
     percent: int
 
     @property
@@ -42,13 +36,8 @@ class WrongProperties(Step[Store]):
         """The size of the errors."""
         return f"{self.pushes.name}-properties-{self.percent}-percent"
 
-    def run(self, runner: "Runner") -> Store:
-        """Return the dataset, made where that is unfinished."""
-        settings = {"properties_wrong_percent": self.percent}
-        store = runner.result(self.pushes)
-        return derive(store, runner.folder(self), settings, self._change)
-
-    def _change(self, arrays: Arrays) -> Arrays:
+    def change(self, arrays: Arrays) -> Arrays:
+        """Return the pushes with wrong masses and radii."""
         rng = np.random.default_rng(_SEED)
         wrong = {
             name: arrays[name]
@@ -58,24 +47,16 @@ class WrongProperties(Step[Store]):
         return arrays | wrong
 
 
-@dataclass(frozen=True, eq=False)
-class OutsideAngles(Step[Store]):
+class OutsideAngles(Derive):
     """The pushes outside the training range of angles."""
-
-    pushes: Step[Store]
 
     @property
     def name(self) -> str:
         """The pushes."""
         return f"{self.pushes.name}-outside"
 
-    def run(self, runner: "Runner") -> Store:
-        """Return the dataset, made where that is unfinished."""
-        store = runner.result(self.pushes)
-        return derive(store, runner.folder(self), {"kept": "outside"}, self._change)
-
-    @staticmethod
-    def _change(arrays: Arrays) -> Arrays:
+    def change(self, arrays: Arrays) -> Arrays:
+        """Return the pushes beyond one of the largest angles."""
         contact, heading = push_angles(arrays)
         kept = (contact > np.deg2rad(60)) | (heading > np.deg2rad(30))
         return {name: array[kept] for name, array in arrays.items()}

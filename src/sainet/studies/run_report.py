@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -83,7 +82,7 @@ def page_of(folder: Path) -> str:
         ) from error
 
 
-def _json(path: Path) -> dict[str, Any]:
+def _json(path: Path) -> dict[str, object]:
     return read_json(path) if path.is_file() else {}
 
 

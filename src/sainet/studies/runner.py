@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from sainet.learning.log import read_log
 from sainet.runs.workers import worker_lost
@@ -59,7 +59,7 @@ class Runner:
     executor: Executor | None = None  # simulates and runs episodes; None: this process
     report: Report = lambda event: None  # noqa: E731
     trainers: Executor | None = None  # trains networks at once; None: one by one
-    _results: dict[str, Any] = field(default_factory=dict)
+    _results: dict[str, object] = field(default_factory=dict)
 
     def folder(self, step: Step[Any]) -> Path:
         """Return the run folder of a step."""
@@ -73,7 +73,7 @@ class Runner:
         """
         if step.key not in self._results:
             self._run(step)
-        return self._results[step.key]
+        return cast("T", self._results[step.key])
 
     @contextmanager
     def bar(self, title: str, total: int) -> Iterator[Bar]:

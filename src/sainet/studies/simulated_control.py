@@ -6,16 +6,27 @@ shipped ones.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 from sainet.control.config import ControlConfig
+from sainet.control.record import EpisodeRecord
+from sainet.control.trials import measure_trials, run_trials
 from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.claims import Claim, solves_more
-from sainet.evaluation.measurements import Condition, PublishedValues
+from sainet.evaluation.measurements import (
+    Condition,
+    Measurements,
+    PublishedValues,
+)
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import IN, SAIN
-from sainet.studies.steps import Join, RunTrials
+from sainet.studies.steps import Join, Step
 from sainet.studies.study import Plan, Scope, Study
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Bar, Runner
 
 TRIALS = {"quick": 4, "paper": 100}
 MODELS = (
@@ -27,6 +38,41 @@ MODELS = (
 GOALS = ("easy", "hard")
 PLANNERS = ("greedy", "tree")
 _FACTORS = ("world", "goals", "planner", "given_properties", "disks")
+
+
+@dataclass(frozen=True, eq=False)
+class RunTrials(Step[Measurements]):
+    """Control trials of models on the same goals."""
+
+    models: tuple[ModelId, ...]  # shipped
+    config: ControlConfig  # of every model
+    condition: Condition
+
+    @property
+    def name(self) -> str:
+        """The condition."""
+        return self.condition.label
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the outcomes; finished episodes are kept."""
+        records = {}
+        for model in self.models:
+            config = replace(self.config, model=model.slug)
+            title = f"Pushing ({model.slug}, {self.name})"
+            with runner.bar(title, config.trials) as bar:
+                solved: list[bool] = []
+                records[model] = run_trials(
+                    config,
+                    runner.folder(self) / model.slug,
+                    executor=runner.executor,
+                    on_episode=partial(_count, bar, solved),
+                )
+        return measure_trials(records, self.condition)
+
+
+def _count(bar: "Bar", solved: list[bool], record: EpisodeRecord) -> None:
+    solved.append(record.solved)
+    bar.add(1, f"{sum(solved)} solved")
 
 
 def _plan(scope: Scope) -> Plan:

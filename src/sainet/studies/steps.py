@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from msgspec import structs
 
-from sainet.control.config import ControlConfig
-from sainet.control.record import EpisodeRecord
-from sainet.control.trials import measure_trials, run_trials
 from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
+from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
+from sainet.datasets.writer import derive
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join, pool_trainings
 from sainet.evaluation.measurements import Condition, Measurements
@@ -28,7 +27,7 @@ from sainet.models.library import Model, load_model
 from sainet.runs.documents import content_hash
 
 if TYPE_CHECKING:
-    from sainet.studies.runner import Bar, Runner
+    from sainet.studies.runner import Runner
 
 T = TypeVar("T")
 _DIGEST = 10  # characters of a hash in the name of a folder
@@ -117,6 +116,22 @@ class First(Step[Store]):
     def run(self, runner: "Runner") -> Store:
         """Return the pushes."""
         return runner.result(self.pushes).first(self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Derive(Step[Store]):
+    """A dataset that a function makes of another one."""
+
+    pushes: Step[Store]
+
+    @abc.abstractmethod
+    def change(self, arrays: Arrays) -> Arrays:
+        """Return the changed arrays, with fewer pushes perhaps."""
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the dataset, made where that is unfinished."""
+        store, folder = runner.result(self.pushes), runner.folder(self)
+        return derive(store, folder, {"step": self.key}, self.change)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,41 +263,6 @@ class Evaluate(Step[Measurements]):
             )
         found = pool_trainings(found, pools)
         return found if self.condition is None else found.in_condition(self.condition)
-
-
-@dataclass(frozen=True, eq=False)
-class RunTrials(Step[Measurements]):
-    """Control trials of models on the same goals."""
-
-    models: tuple[ModelId, ...]  # shipped
-    config: ControlConfig  # of every model
-    condition: Condition
-
-    @property
-    def name(self) -> str:
-        """The condition."""
-        return self.condition.label
-
-    def run(self, runner: "Runner") -> Measurements:
-        """Return the outcomes; finished episodes are kept."""
-        records = {}
-        for model in self.models:
-            config = replace(self.config, model=model.slug)
-            title = f"Pushing ({model.slug}, {self.name})"
-            with runner.bar(title, config.trials) as bar:
-                solved: list[bool] = []
-                records[model] = run_trials(
-                    config,
-                    runner.folder(self) / model.slug,
-                    executor=runner.executor,
-                    on_episode=partial(_count, bar, solved),
-                )
-        return measure_trials(records, self.condition)
-
-
-def _count(bar: "Bar", solved: list[bool], record: EpisodeRecord) -> None:
-    solved.append(record.solved)
-    bar.add(1, f"{sum(solved)} solved")
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
@@ -198,9 +197,9 @@ class Study:
 
 
 def _write(result: Result, scope: Scope, out: Path) -> None:
-    made: dict[str, Any] = {"command": "reproduce", "study": out.name}
     content = scope.recorded and open_store(scope.recorded).content
-    write_json(out / CONFIG, made | {"recorded": content})
+    made = {"command": "reproduce", "study": out.name, "recorded": content}
+    write_json(out / CONFIG, made)
     write_document(out / MANIFEST, manifest())
     write_document(out / TABLE, result)
 
