@@ -9,7 +9,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER
 from sainet.report.figures.efficiency import draw_data_efficiency
 from sainet.studies.paper_setup import IN, SAIN, PaperSetup
-from sainet.studies.recorded_models import Tuner, Variant, surfaces_of
+from sainet.studies.recorded_models import TunedModels, Variant, surfaces_of
 from sainet.studies.recorded_pushes import FOLDS, SUBJECT, JoinFolds
 from sainet.studies.steps import Evaluate, Given, Join
 from sainet.studies.study import RECORDED as RECORDED_PUSHES
@@ -82,8 +82,8 @@ def _recorded(scope: Scope) -> Plan:
         folds, parts = [], []
         for rows in surfaces_of(store).values():
             for fold in make_folds(store, FOLDS[scope.scale], rows):
-                tuner = Tuner(_first(fold, pushes), scope.scale)
-                models = (*tuner.physics(), *map(tuner.model, VARIANTS))
+                tuned = TunedModels(_first(fold, pushes), scope.scale)
+                models = (*tuned.physics(), *map(tuned.model, VARIANTS))
                 folds.append(fold)
                 parts.append(Evaluate(tuple(models), Given(fold.tests)))
         sizes.append(JoinFolds(tuple(parts), tuple(folds), of_pushes(pushes)))

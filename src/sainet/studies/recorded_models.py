@@ -87,8 +87,8 @@ class AroundIdentified(Step[Model]):
         return replace(load_model(self.network), id=self.id, dynamics=dynamics)
 
 
-class Tuner:
-    """Models of some training pushes."""
+class TunedModels:
+    """The models that can be made of some training pushes."""
 
     def __init__(self, training: Store, scale: Scale) -> None:
         """Identify the engine on the same pushes."""

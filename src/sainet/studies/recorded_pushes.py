@@ -21,7 +21,13 @@ from sainet.evaluation.joining import add_models, join_folds, without_prediction
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.models.identity import Features, ModelKind
 from sainet.models.library import Model
-from sainet.studies.recorded_models import Inside, Learned, Tuner, Variant, surfaces_of
+from sainet.studies.recorded_models import (
+    Inside,
+    Learned,
+    TunedModels,
+    Variant,
+    surfaces_of,
+)
 from sainet.studies.steps import Evaluate, Given, Join, Step
 from sainet.studies.study import RECORDED, Plan, Scope, Study
 
@@ -118,19 +124,19 @@ def _plan(scope: Scope) -> Plan:
     engine_errors: dict[str, Step[EndOffsets]] = {}
     for surface, rows in surfaces_of(store).items():
         for fold in make_folds(store, FOLDS[scale], rows):
-            tuner = Tuner(fold.training, scale)
-            models = (*tuner.physics(), *map(tuner.model, VARIANTS))
+            tuned = TunedModels(fold.training, scale)
+            models = (*tuned.physics(), *map(tuned.model, VARIANTS))
             own_folds.append(fold)
             own.append(Evaluate(tuple(models), Given(fold.tests)))
         pushes = store.take(rows)
         for engine, model in zip(
-            ("", ", identified"), Tuner(pushes, scale).physics(), strict=True
+            ("", ", identified"), TunedModels(pushes, scale).physics(), strict=True
         ):
             engine_errors[f"{surface}{engine}"] = EndErrors(model, Given(pushes))
     folds = make_folds(store, FOLDS[scale])
     for fold in folds:
-        tuner = Tuner(fold.training, scale)
-        models = [tuner.model(variant, "for-all") for variant in FOR_ALL]
+        tuned = TunedModels(fold.training, scale)
+        models = [tuned.model(variant, "for-all") for variant in FOR_ALL]
         every.append(Evaluate(tuple(models), Given(fold.tests)))
     whole = BySurface(
         JoinFolds(tuple(own), tuple(own_folds)),
@@ -151,8 +157,8 @@ def _elsewhere(scope: Scope, store: Store) -> Iterator[Evaluate]:
         return
     few, tests = _few(store, surfaces[_TO])
     for count, rows in ((0, surfaces[_FROM]), (FEW, np.append(surfaces[_FROM], few))):
-        tuner = Tuner(store.take(rows), scope.scale)
-        models = (*tuner.physics(), *map(tuner.model, ELSEWHERE))
+        tuned = TunedModels(store.take(rows), scope.scale)
+        models = (*tuned.physics(), *map(tuned.model, ELSEWHERE))
         label = f"{_FROM} to {_TO}, {count} of it"
         factors = {"surface": _TO, "trained_on": _FROM, "training_pushes": count}
         condition = Condition(label=label, factors=factors)
