@@ -96,6 +96,8 @@ def _own_texts(settings: type) -> dict[str, str]:
                 paragraphs = inspect.cleandoc(text).split("\n\n")
                 lines = (" ".join(paragraph.split()) for paragraph in paragraphs)
                 texts[name] = "\n\n".join(lines)
+            case _:
+                pass
     return texts
 
 

@@ -2,7 +2,7 @@
 
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -201,16 +201,16 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _poses(pose: np.ndarray) -> list:
+def _poses(pose: np.ndarray) -> list[Any]:
     """Return x and y in mm and the angle in degrees, rounded to 0.01."""
     return _rounded(pose, np.array([1000, 1000, np.rad2deg(1)]))
 
 
-def _mm(metres: object) -> list:
+def _mm(metres: object) -> list[Any]:
     return _rounded(metres, 1000)
 
 
-def _rounded(values: object, unit: np.ndarray | int) -> list:
+def _rounded(values: object, unit: np.ndarray | int) -> list[Any]:
     """Return numbers rounded to 0.01 of a unit, None for NaN and infinity."""
     found = np.round(np.asarray(values, np.float64) * unit, 2)
     numbers = found.astype(object)

@@ -177,7 +177,9 @@ def _difference(found: object, wanted: object, field: str = "") -> str:
             return f"{field}length is {len(found)}, not {len(wanted)}"
         places = range(len(found))
         parts = ((found[i], wanted[i], f"{field}{i}.") for i in places)
-    elif found == wanted if type(found) is type(wanted) else type(found) is wanted:
+    elif type(found) is (wanted if isinstance(wanted, type) else type(wanted)) and (
+        isinstance(wanted, type) or found == wanted
+    ):
         return ""
     else:
         return f"{field.rstrip('.')} is {shown(found)}, not {wanted}"

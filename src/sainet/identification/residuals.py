@@ -90,9 +90,12 @@ def pose_errors(
     return jnp.take_along_axis(pose - batch.measured, looks, axis=1)
 
 
+Values = dict[str, Array]
+
+
 @eqx.filter_jit
 def _residual(
-    free: dict, fixed: dict, sizes: Array, batch: PushBatch, steps: Array
+    free: Values, fixed: Values, sizes: Array, batch: PushBatch, steps: Array
 ) -> Array:
     error = pose_errors(values_at(free | fixed), batch, steps)
     scaled = error / jnp.broadcast_to(sizes, error.shape)
@@ -127,7 +130,7 @@ def _arguments(
     free: Sequence[str],
     scale: Scale,
     sample: Sample,
-) -> tuple[dict, dict, Array, PushBatch, Array]:
+) -> tuple[Values, Values, Array, PushBatch, Array]:
     tree = {name: jnp.float32(value) for name, value in coordinates.items()}
     chosen = {name: tree.pop(name) for name in free}
     sizes = jnp.array([scale.position, scale.position, scale.rotation], jnp.float32)

@@ -24,6 +24,8 @@ from sainet.models.inputs import (
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.scenes.state import pack_motion
 
+Error = Callable[[Array, Array], Array]  # of each body: predicted against true
+
 
 class LossWeights(eqx.Module):
     """Weights of the terms: the settings over the variance in the training data."""
@@ -69,7 +71,7 @@ def _linear_beyond(error: float, loss: Array) -> Array:
     return 2 * error**2 * (jnp.sqrt(1 + loss / error**2) - 1)
 
 
-def _pose_error(weights: LossWeights):  # noqa: ANN202
+def _pose_error(weights: LossWeights) -> Error:
     def error(predicted: Array, true: Array) -> Array:
         place = jnp.sum((predicted[..., 0:2] - true[..., 0:2]) ** 2, axis=-1)
         sine = (jnp.sin(predicted[..., 2]) - jnp.sin(true[..., 2])) ** 2
@@ -79,7 +81,7 @@ def _pose_error(weights: LossWeights):  # noqa: ANN202
     return error
 
 
-def _rate_error(weights: LossWeights):  # noqa: ANN202
+def _rate_error(weights: LossWeights) -> Error:
     def error(predicted: Array, true: Array) -> Array:
         velocity = jnp.sum((predicted[..., 0:2] - true[..., 0:2]) ** 2, axis=-1)
         spin = (predicted[..., 2] - true[..., 2]) ** 2
@@ -88,7 +90,9 @@ def _rate_error(weights: LossWeights):  # noqa: ANN202
     return error
 
 
-def _masked_error(predicted: Array, true: Array, observed: Array, error) -> Array:  # noqa: ANN001
+def _masked_error(
+    predicted: Array, true: Array, observed: Array, error: Error
+) -> Array:
     # The true value may be NaN where nothing was observed; replace it before it is
     # used, for zero times NaN is NaN in the gradient.
     known = jnp.broadcast_to(observed[..., None, None], true.shape)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -71,7 +72,7 @@ class EpisodeFrames:
         return self.record.steps
 
     @staticmethod
-    def _shown(path: list) -> list:
+    def _shown(path: list[Any]) -> list[Any]:
         return path[:_FRAMES_OF_PUSH]
 
 

@@ -104,8 +104,10 @@ def _plan(scope: Scope) -> Plan:
 def _condition(robot: Robot, pushes: int, way: Way) -> Condition:
     changes = msgspec.to_builtins(way.change).items()
     words = "-".join([way.start, *(f"{key}-{value}" for key, value in changes)])
-    factors = {"robot": robot.name, "training_pushes": pushes, "start": way.start}
-    return Condition(label=f"{robot.name}/{pushes}-pushes/{words}", factors=factors)
+    return Condition(
+        label=f"{robot.name}/{pushes}-pushes/{words}",
+        factors={"robot": robot.name, "training_pushes": pushes, "start": way.start},
+    )
 
 
 def choose(summary: Summary) -> tuple[Choice, ...]:

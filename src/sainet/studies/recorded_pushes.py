@@ -160,8 +160,10 @@ def _elsewhere(scope: Scope, store: Store) -> Iterator[Evaluate]:
         tuned = TunedModels(store.take(rows), scope.scale)
         models = (*tuned.physics(), *map(tuned.model, ELSEWHERE))
         label = f"{_FROM} to {_TO}, {count} of it"
-        factors = {"surface": _TO, "trained_on": _FROM, "training_pushes": count}
-        condition = Condition(label=label, factors=factors)
+        condition = Condition(
+            label=label,
+            factors={"surface": _TO, "trained_on": _FROM, "training_pushes": count},
+        )
         yield Evaluate(models, Given(store.take(tests)), condition)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -45,7 +46,7 @@ def report_of(folder: Path) -> Report:
     figures = tuple(_figures(folder))
     if not (table or card or is_identified or episodes or figures):
         raise BadInput(f"{folder}: nothing to show in it{_way_out(folder)}.")
-    settings = {**_json(folder / CONFIG), **card}
+    settings: dict[str, Any] = {**_json(folder / CONFIG), **card}
     made = settings.pop("manifest", None) or _json(folder / MANIFEST)
     command = settings.get("command")
     return Report(

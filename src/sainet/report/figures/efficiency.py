@@ -10,6 +10,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLo
 from sainet.evaluation.metrics import METRICS
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.report.figures.canvas import (
+    LineLook,
     add_grid,
     house_look,
     label_ends,
@@ -96,8 +97,10 @@ def _draw_model(axes: Axes, style: ModelStyle, rows: list[_Row], metric: str) ->
     found = [_estimate(each.row, metric) for each in rows]
     error, low, high = np.array([(e.value, e.low, e.high) for e in found], float).T
     learns = np.ptp(error) > 0
-    marker = {"marker": "o", "markersize": 3.5} if learns else {}
-    axes.plot(pushes, error, **line_look(style, 1.6 if learns else 1.0), **marker)
+    look = line_look(style, 1.6 if learns else 1.0)
+    if learns:
+        look |= LineLook(marker="o", markersize=3.5)
+    axes.plot(pushes, error, **look)
     if learns:
         axes.fill_between(pushes, low, high, alpha=0.16, color=style.color, linewidth=0)
 

@@ -58,8 +58,15 @@ def _draw_table(axes: Axes, case: "EndOffsets") -> None:
     if full:
         means = np.array([offset[members[cell]].mean(axis=0) for cell in full])
         middles = _CELL * (cells[full] + 0.5)
-        look = {"angles": "xy", "scale_units": "xy", "scale": 1 / _ARROW}
-        arrows = axes.quiver(*middles.T, *means.T, color=PUSHED, width=0.006, **look)
+        arrows = axes.quiver(
+            *middles.T,
+            *means.T,
+            color=PUSHED,
+            width=0.006,
+            angles="xy",
+            scale_units="xy",
+            scale=1 / _ARROW,
+        )
         axes.quiverkey(arrows, 0.12, 0.04, _SHOWN, f"{_SHOWN:g} mm", labelpos="E")
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_ylabel("y of the disk (mm)")

@@ -7,6 +7,7 @@ path. Paths have a panel of the whole scene, and a magnified panel for each disk
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -190,7 +191,12 @@ def _draw_mark(axes: Axes, track: Track, body: int, radius: float) -> None:
     )
 
 
-def _circle(axes: Axes, place: Float[np.ndarray, "2"], radius: float, **look) -> None:  # noqa: ANN003
+def _circle(
+    axes: Axes,
+    place: Float[np.ndarray, "2"],
+    radius: float,
+    **look: Any,  # noqa: ANN401
+) -> None:
     defaults = {"facecolor": "none", "linewidth": 1.0}
     if np.isfinite(place).all():
         x, y = _MM * place

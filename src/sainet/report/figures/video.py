@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from importlib.util import find_spec
 from itertools import repeat
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 from jaxtyping import UInt8
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from sainet.control.record import EpisodeRecord
@@ -38,11 +40,7 @@ Frame = UInt8[np.ndarray, "height width 3"]
 
 def best_format() -> str:
     """Return the suffix of the best format that is available."""
-    try:
-        import imageio_ffmpeg  # noqa: F401
-    except ImportError:
-        return ".gif"
-    return ".mp4"
+    return ".mp4" if find_spec("imageio_ffmpeg") else ".gif"
 
 
 def frame_count(record: EpisodeRecord) -> int:
@@ -114,7 +112,7 @@ class _Stage:
         self._canvas.draw()
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
-    def _draw_scene(self) -> list:
+    def _draw_scene(self) -> list[tuple[Circle, Line2D, Line2D]]:
         record, scene = self.record, self._scene
         goal = record.goal_mm[0], record.goal_mm[1]
         scene.add_patch(Circle(goal, record.tolerance_mm, color=TARGET, zorder=4))

@@ -9,7 +9,7 @@ come from measurements.
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jinja2
 import msgspec
@@ -199,7 +199,7 @@ def rendered(root: Path) -> dict[Path, str]:
         lstrip_blocks=True,
         autoescape=False,  # noqa: S701  (Markdown from our own templates)
     )
-    environment.globals.update(Evidence(root).helpers)
+    environment.globals.update(cast(Any, Evidence(root).helpers))
     pages = {
         path.stem: _page(environment.get_template(path.name))
         for path in sorted(templates.glob("*.md.j2"))
