@@ -9,11 +9,13 @@ from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
 from sainet.datasets.surrogate import Robot
 from sainet.learning.recipes import FROM_ENGINE
-from sainet.models.card import read_card
+from sainet.models.card import read_card, read_identified
+from sainet.models.library import load_model
 from sainet.runs.errors import BadInput
 from sainet.studies import data_efficiency, fine_tuning, load_study, recorded_pushes
 from sainet.studies.fine_tuning import Way
-from sainet.studies.recorded_models import Variant, surfaces_of
+from sainet.studies.recorded_models import TunedModels, Variant, surfaces_of
+from sainet.studies.runner import Runner
 from sainet.studies.study import STEPS, Change, Scope
 
 FEW = (
@@ -73,6 +75,19 @@ def test_without_recorded_pushes_there_is_no_table():
     for name in ("recorded-pushes", "recorded-data-efficiency"):
         with pytest.raises(BadInput, match="`recorded` is missing"):
             load_study(name).check(Scope("quick"))
+
+
+def test_a_shipped_network_around_an_identified_engine_names_that_engine(
+    recorded, tmp_path
+):
+    """Stored predictions of the engine that it was trained around must not be used."""
+    runner = Runner(tmp_path)
+    tuned = TunedModels(recorded, "quick")
+    identify(recorded, runner.folder(tuned.identified))
+    step = tuned.model(FEW[0])
+    model = step.run(runner)
+    engine = read_identified(runner.folder(tuned.identified)).engine
+    assert model.internal == engine != load_model("sain-stroke").internal
 
 
 @pytest.mark.slow

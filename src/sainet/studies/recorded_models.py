@@ -84,7 +84,8 @@ class AroundIdentified(Step[Model]):
         internal = read_identified(runner.folder(self.identified)).engine
         around = SimulatorAugmented(network, internal.simulator.build())
         dynamics = with_camera(around, internal.camera)
-        return replace(load_model(self.network), id=self.id, dynamics=dynamics)
+        found = load_model(self.network)
+        return replace(found, id=self.id, dynamics=dynamics, internal=internal)
 
 
 class TunedModels:
