@@ -54,8 +54,9 @@ format: setup-dev  ## Rewrite the sources the way `make check` wants them
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
+# KEEP='FOLDER ...' first puts the measurements of these studies into results/.
 pages: setup  ## Render docs/results/, figures and README.md from results/
-	$(BIN)/python -m sainet.report.pages.results
+	$(BIN)/python -m sainet.report.pages.results $(KEEP)
 
 bench: setup-dev  ## Run the benchmarks
 	$(BIN)/sainet bench

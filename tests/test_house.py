@@ -180,17 +180,17 @@ BELOW_CLI = [tree for p, tree in TREES.items() if not {p, p.parent} & NO_FLAGS]
 TOOLS = sorted((REPOSITORY / "tools").glob("*.py"))
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
-    "modules": (lambda: len(MODULES), 240, 150),
+    "modules": (lambda: len(MODULES), 180, 150),
     "code lines in src": (lambda: sum(map(code_lines, MODULES)), 15_500, 11_000),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (
         lambda: sum(map(asks_kind_of_controls, TREES.values())),
-        15,
+        0,
         0,
     ),
     "tests of parts of model names": (
         lambda: sum(map(name_part_tests, MODELLING)),
-        4,
+        0,
         0,
     ),
     "flags in strings below cli/": (
@@ -200,7 +200,7 @@ COUNTS = {
     ),
     "modules with dict[str, Any]": (
         lambda: sum(map(has_untyped_dict, TREES.values())),
-        70,
+        6,
         6,
     ),
 }

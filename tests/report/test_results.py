@@ -5,13 +5,18 @@ import shutil
 
 import pytest
 
+from sainet.evaluation.measurements import read_measurements
 from sainet.report.pages.results import (
     BEGIN,
     END,
+    MEASUREMENTS,
     TEMPLATES,
+    keep,
     rendered,
     with_block,
 )
+from sainet.runs.documents import write_json
+from sainet.runs.errors import BadInput
 from support import REPOSITORY
 
 # Digits may stand outside rendered blocks in code, links, versions, years, tables and
@@ -88,3 +93,16 @@ def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
     assert pages["README.md"] == f"{BEGIN}readme-block\n{END}"
     assert "| `devices` |" in pages["benchmarks.md"]
     assert pages["index.md"] == "benchmarks.md: Timings\n"
+
+
+def test_measurements_of_a_study_are_kept_at_published_precision(tmp_path):
+    folder, root = tmp_path / "engine-parity-quick", tmp_path / "repository"
+    whole = read_measurements(REPOSITORY / "results" / "engine-parity.nc.xz")
+    whole.write(folder / MEASUREMENTS)
+    write_json(folder / "config.json", {"study": "engine-parity"})
+    keep(folder, root)
+    (kept,) = (root / "results").iterdir()
+    assert kept.name == "engine-parity.nc.xz"
+    assert read_measurements(kept).to_bytes() == whole.to_bytes()
+    with pytest.raises(BadInput, match="config.json"):
+        keep(tmp_path / "no-study", root)

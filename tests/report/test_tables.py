@@ -12,8 +12,16 @@ from rich.console import Console
 from report import samples
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
+from sainet.report import WRITERS
 from sainet.report.arrange import arrange
-from sainet.report.writers import print_table, to_csv, to_html, to_latex, to_markdown
+from sainet.report.writers import (
+    print_table,
+    to_csv,
+    to_html,
+    to_latex,
+    to_markdown,
+    write_table,
+)
 
 HOSTILE = "<script>alert(1)</script>|[red]*x*"
 NOTHING = Summary(models=())
@@ -214,3 +222,13 @@ def test_hostile_names_stay_text():
     rows = [line for line in text.splitlines() if line.startswith("|")]
     assert len({len(re.split(r"(?<!\\)\|", row)) for row in rows}) == 1
     assert "[red]" in printed(result, 200)
+
+
+@pytest.mark.parametrize("ending", WRITERS)
+def test_a_table_is_written_in_the_format_of_its_file(tmp_path, ending):
+    path = tmp_path / f"table{ending}"
+    write_table(arrange(samples.result()), path)
+    text = path.read_text()
+    assert "SAIN" in text
+    parts = {".md": "| :--", ".html": "<table", ".tex": r"\begin{tabular}"}
+    assert parts.get(ending, "Model,n,") in text

@@ -41,7 +41,7 @@ def make(tiny, runner, tmp_path):
 
     def run(name, recorded=None):
         out = tmp_path / name
-        found = load_study(name).run(Scope("quick", recorded), runner, out)
+        found = load_study(name).run(name, Scope("quick", recorded), runner, out)
         assert read_document(out / TABLE, Result) == found
         measured = read_measurements(out / "measurements.nc")
         assert measured.header.conditions == found.summary.conditions

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
+from sainet.report import WRITERS
+from sainet.runs.errors import require_one_of
 
 if TYPE_CHECKING:
     from sainet.datasets.store import Store
@@ -30,12 +32,16 @@ class Evaluate:
     engine of their training."""
     force: bool = False
     """Skip data and engine compatibility checks."""
+    table: Path | None = None
+    """File for the table: .md, .html, .tex or .csv. Default: none."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
         """Evaluate the models and print the table."""
+        if self.table is not None:
+            require_one_of("table", self.table.suffix, WRITERS)
         use_devices(self.devices)
         from sainet.datasets.store import open_store
         from sainet.evaluation.as_json import to_json_object
@@ -43,7 +49,7 @@ class Evaluate:
         from sainet.evaluation.summary import summarise
         from sainet.models.library import load_model, other_worlds
         from sainet.report.arrange import arrange
-        from sainet.report.writers import print_table
+        from sainet.report.writers import print_table, write_table
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
@@ -64,6 +70,8 @@ class Evaluate:
             )
         summary = summarise(measured)
         print_table(arrange(summary), self.output.console)
+        if self.table is not None:
+            write_table(arrange(summary), self.table)
         return to_json_object(summary)
 
     def _fitting(self, store: "Store") -> list[str]:

@@ -88,7 +88,7 @@ class Reproduce:
         from sainet.report.writers import print_table
 
         self.output.say(f"{name}: {study.question}")
-        result = study.run(scope, runner, self.out / f"{name}-{self.scale}")
+        result = study.run(name, scope, runner, self.out / f"{name}-{self.scale}")
         console = self.output.console
         print_table(arrange(result.summary), console)
         for ruling in rulings(study.claims, result.summary):

@@ -19,7 +19,7 @@ import xarray as xr
 from sainet.models.identity import ModelId
 from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadInput
-from sainet.runs.manifest import Manifest
+from sainet.runs.manifest import Manifest, manifest
 
 FORMAT_VERSION = 1
 PUSHES, TRIALS = ("model", "training", "sample", "body"), ("model", "sample")
@@ -187,6 +187,14 @@ class Measurements:
         return Measurements(
             data, msgspec.structs.replace(self.header, conditions=conditions)
         )
+
+    def made_by(self, *command: str) -> "Measurements":
+        """Return the same measurements with a command and this machine as origin."""
+        source = msgspec.structs.replace(
+            self.header.provenance, command=command, manifest=manifest()
+        )
+        header = msgspec.structs.replace(self.header, provenance=source)
+        return replace(self, header=header)
 
     def with_published(self, published: tuple[PublishedValues, ...]) -> "Measurements":
         """Return the same measurements with published values beside them."""

@@ -5,6 +5,7 @@ import html
 import io
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich import box
 from rich.console import Console
@@ -12,9 +13,11 @@ from rich.table import Table as RichTable
 from rich.text import Text
 
 from sainet.models.card import Identified
+from sainet.report import WRITERS
 from sainet.report.pages import render
 from sainet.report.palette import styles_of
 from sainet.report.table import EMPTY, Cell, Column, Line, Table
+from sainet.runs.documents import write_bytes
 
 _ANY_WIDTH = 10_000  # characters
 _ESTIMATE_HEADINGS = ("parameter", "before", "value", "95 % interval")
@@ -133,6 +136,13 @@ def print_estimates(found: Identified, console: Console) -> None:
             f"rotation {found.before_deg:.2f} and {found.after_deg:.2f} degrees."
         )
     )
+
+
+def write_table(table: Table, path: Path) -> None:
+    """Write a table in the format of the file's ending, one of `WRITERS`."""
+    place = WRITERS.index(path.suffix)
+    write = (to_markdown, to_html, to_latex, to_csv)[place]
+    write_bytes(path, write(table).encode())
 
 
 def to_html(table: Table) -> str:

@@ -15,6 +15,7 @@ from sainet.evaluation.measurements import Measurements, PublishedValues
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.report.figures.engine_errors import draw_engine_errors
+from sainet.report.pages.results import AS_TRAINED, MEASUREMENTS
 from sainet.runs.documents import write_bytes, write_document, write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
@@ -161,21 +162,24 @@ class Study:
         kept = found.comparisons if self.compares else ()
         return msgspec.structs.replace(found, comparisons=kept)
 
-    def run(self, scope: Scope, runner: Runner, out: Path) -> Result:
+    def run(self, name: str, scope: Scope, runner: Runner, out: Path) -> Result:
         """Run the steps and write table, measurements, figures and origin.
 
         Args:
+            name: of the study.
             scope: scale and recorded pushes.
             runner: of the steps.
             out: folder of the study.
         """
         plan = self.plan(scope)
+        command = ("sainet", "reproduce", name, "--scale", scope.scale)
         measured = runner.result(plan.measured).with_published(self.published)
+        measured = measured.made_by(*command)
         summary, as_trained = self.summarise(measured), None
-        measured.write(out / "measurements.nc")
+        measured.write(out / MEASUREMENTS)
         if plan.as_trained is not None:
-            found = runner.result(plan.as_trained)
-            found.write(out / "as-trained.nc")
+            found = runner.result(plan.as_trained).made_by(*command)
+            found.write(out / AS_TRAINED)
             as_trained = self.summarise(found)
         result = Result(
             summary=summary,
@@ -192,13 +196,13 @@ class Study:
             draw_engine_errors(cases, out / "engine-errors.svg")
         for step in plan.networks:
             _copy(runner.folder(step), out / "networks" / step.id.slug)
-        _write(result, scope, out)
+        _write(name, result, scope, out)
         return result
 
 
-def _write(result: Result, scope: Scope, out: Path) -> None:
+def _write(name: str, result: Result, scope: Scope, out: Path) -> None:
     content = scope.recorded and open_store(scope.recorded).content
-    made = {"command": "reproduce", "study": out.name, "recorded": content}
+    made = {"command": "reproduce", "study": name, "recorded": content}
     write_json(out / CONFIG, made)
     write_document(out / MANIFEST, manifest())
     write_document(out / TABLE, result)

@@ -1,11 +1,13 @@
 """Pages of results: every table, figure and number rendered from `results/`.
 
-    python -m sainet.report.pages.results
+    python -m sainet.report.pages.results [FOLDER ...]
 
-Prose stands in the templates in ``docs/templates``, which set their titles; numbers
-come from measurements.
+First the measurements of each FOLDER, of a study that `sainet reproduce` ran, are put
+into ``results/``. Prose stands in the templates in ``docs/templates``, which set their
+titles; numbers come from measurements.
 """
 
+import sys
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -21,8 +23,10 @@ from sainet.report.arrange import arrange
 from sainet.report.palette import labels_of
 from sainet.report.verdicts import beside_published, worded_places
 from sainet.report.writers import to_markdown
-from sainet.runs.documents import read_document, write_bytes
+from sainet.runs.documents import read_document, read_json, write_bytes
+from sainet.runs.folders import CONFIG
 
+MEASUREMENTS, AS_TRAINED = "measurements.nc", "as-trained.nc"  # of a study
 TEMPLATES, PAGES, RESULTS = "docs/templates", "docs/results", "results"
 BEGIN, END = "<!-- rendered by make pages -->\n", "<!-- end of rendered text -->"
 _INDEX, _README = "index.md", "readme-block.md"
@@ -241,9 +245,28 @@ def draw_figures(root: Path) -> None:
         draw_data_efficiency(Evidence(root).summary(name), path)
 
 
+def keep(folder: Path, root: Path) -> None:
+    """Keep the measurements of a study in ``results/``, at published precision.
+
+    Args:
+        folder: of the study, as `sainet reproduce` wrote it.
+        root: the repository.
+
+    Raises:
+        BadInput: the folder holds no measurements.
+    """
+    study = read_json(folder / CONFIG).get("study", folder.name)
+    for file, name in ((MEASUREMENTS, f"{study}"), (AS_TRAINED, f"{study}-as-trained")):
+        if file == MEASUREMENTS or (folder / file).is_file():
+            measured = read_measurements(folder / file)
+            measured.compact().write(root / RESULTS / f"{name}.nc.xz")
+
+
 def main() -> None:
-    """Write every page that changed."""
+    """Keep the measurements of the given folders, then write every page."""
     root = Path.cwd()
+    for folder in sys.argv[1:]:
+        keep(Path(folder), root)
     for path, text in rendered(root).items():
         write_bytes(path, text.encode())
     draw_figures(root)
