@@ -88,7 +88,9 @@ class Reproduce:
         from sainet.report.writers import print_table
 
         self.output.say(f"{name}: {study.question}")
-        result = study.run(name, scope, runner, self.out / f"{name}-{self.scale}")
+        command = ("sainet", "reproduce", name, "--scale", self.scale)
+        out = self.out / f"{name}-{self.scale}"
+        result = study.run(name, scope, runner, out, command=command)
         console = self.output.console
         print_table(arrange(result.summary), console)
         for ruling in rulings(study.claims, result.summary):

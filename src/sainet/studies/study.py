@@ -1,6 +1,6 @@
 """Studies: a question, the steps that answer it, and what is made of their results."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -162,7 +162,15 @@ class Study:
         kept = found.comparisons if self.compares else ()
         return msgspec.structs.replace(found, comparisons=kept)
 
-    def run(self, name: str, scope: Scope, runner: Runner, out: Path) -> Result:
+    def run(
+        self,
+        name: str,
+        scope: Scope,
+        runner: Runner,
+        out: Path,
+        *,
+        command: Sequence[str] = (),
+    ) -> Result:
         """Run the steps and write table, measurements, figures and origin.
 
         Args:
@@ -170,9 +178,9 @@ class Study:
             scope: scale and recorded pushes.
             runner: of the steps.
             out: folder of the study.
+            command: that runs the study, for the origin of its measurements.
         """
         plan = self.plan(scope)
-        command = ("sainet", "reproduce", name, "--scale", scope.scale)
         measured = runner.result(plan.measured).with_published(self.published)
         measured = measured.made_by(*command)
         summary, as_trained = self.summarise(measured), None
