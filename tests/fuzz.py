@@ -29,6 +29,7 @@ from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from unittest import mock
 
+import msgspec
 import numpy as np
 from msgspec import structs
 

@@ -71,9 +71,13 @@ NOTHING = Result(summary=Summary(models=()))
 def begun(monkeypatch):
     """The folders of the studies that were run, which do nothing."""
     folders = []
-    monkeypatch.setattr(
-        Study, "run", lambda self, scope, runner, out: folders.append(out) or NOTHING
-    )
+
+    def run(self, name, scope, runner, out, *, command):
+        assert command == ("sainet", "reproduce", name, "--scale", scope.scale)
+        folders.append(out)
+        return NOTHING
+
+    monkeypatch.setattr(Study, "run", run)
     monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
     return folders
 
@@ -116,7 +120,7 @@ def test_claims_are_printed_and_in_the_json(monkeypatch, capsys):
     claim = Claim("the sky is blue", lambda summary: Verdict("holds"))
     study = Study(question="Is it?", plan=Plan, needs=(), claims=(claim,))
     monkeypatch.setattr("sainet.studies.load_study", lambda name: study)
-    monkeypatch.setattr(Study, "run", lambda self, scope, runner, out: ruled)
+    monkeypatch.setattr(Study, "run", lambda *inputs, command: ruled)
     monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
     found = Reproduce(studies=("robot-planar",)).run()
     assert [*found["claims"]] == [{"claim": "the sky is blue", "status": "holds"}]

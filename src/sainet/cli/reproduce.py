@@ -50,6 +50,7 @@ class Reproduce:
     def run(self) -> Json:
         """Run the studies one after another."""
         use_devices(self.devices)
+        trainers = self._trainer_count()
         from sainet.studies import STUDIES, load_study
         from sainet.studies.runner import Runner
         from sainet.studies.study import STEPS, MissingInput, Scope
@@ -68,10 +69,10 @@ class Reproduce:
         tables: dict[str, Json] = {}
         with (
             worker_pool(None) as pool,
-            self._trainer_pool() as trainers,
+            _trainer_pool(trainers) as trainer_pool,
             Bars(self.output) as bars,
         ):
-            runner = Runner(self.out / STEPS, pool, bars, trainers)
+            runner = Runner(self.out / STEPS, pool, bars, trainer_pool)
             for name, study in studies.items():
                 if name not in not_run:
                     tables[name] = self._answer(name, study, scope, runner)
@@ -97,8 +98,8 @@ class Reproduce:
             console.print(ruling, markup=False, soft_wrap=True)
         return result.to_json()
 
-    def _trainer_pool(self) -> AbstractContextManager[Executor | None]:
-        """Return the processes that train in parallel; None for one at a time.
+    def _trainer_count(self) -> int:
+        """Return the number of networks to train at once.
 
         Raises:
             BadInput: fewer than one is wanted, or several on one GPU.
@@ -113,4 +114,9 @@ class Reproduce:
             raise BadInput(f"--trainers is {count}; it must be at least 1.")
         if count > 1 and not is_cpu:
             raise BadInput(f"--trainers is {count}; on a GPU it must be 1.")
-        return worker_pool(count, core_each=True) if count > 1 else nullcontext()
+        return count
+
+
+def _trainer_pool(count: int) -> AbstractContextManager[Executor | None]:
+    """Return the processes that train in parallel; None for one at a time."""
+    return worker_pool(count, core_each=True) if count > 1 else nullcontext()
