@@ -244,6 +244,7 @@ def rehash(folder):
                 {"name": "gzip", "configuration": {"level": 1}},
             ]
         },
+        {"codecs": [{"name": "bytes"}, {"name": "zstd"}]},
         {"codecs": "zstd"},
         {"chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [1]}}},
         {"chunk_key_encoding": {"name": "v2"}},

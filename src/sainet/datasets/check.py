@@ -31,7 +31,7 @@ _LARGEST_CHUNK = 4 << 30  # bytes, decompressed
 _OVERHEAD = 1 << 16  # bytes by which compression may enlarge a chunk
 _ENDS = ("low", "high")  # of a range
 # Fields that Zarr may leave out where they have the wanted value.
-_OPTIONAL = {"configuration", "separator", "endian", "checksum", "storage_transformers"}
+_OPTIONAL = {"separator", "endian", "checksum", "storage_transformers"}
 _ZSTD = b"\x28\xb5\x2f\xfd"  # first bytes of a frame
 
 
@@ -164,12 +164,20 @@ def _array_metadata(info: StoreInfo, variable: Variable) -> dict[str, object]:
     }
 
 
+def _is_needed(name: str, wanted: object) -> bool:
+    """Whether Zarr writes a field always: not if all that is in it may be left out."""
+    if isinstance(wanted, dict):
+        return any(_is_needed(inner, part) for inner, part in wanted.items())
+    return name not in _OPTIONAL
+
+
 def _difference(found: object, wanted: object, field: str = "") -> str:
     """Return how a part of a JSON document differs from the wanted part, if it does."""
     if isinstance(wanted, dict) and isinstance(found, dict):
         if unknown := sorted(found.keys() - wanted.keys()):
             return f"{field}{shown(unknown[0])} is unknown"
-        if missing := sorted(wanted.keys() - found.keys() - _OPTIONAL):
+        needed = {name for name, part in wanted.items() if _is_needed(name, part)}
+        if missing := sorted(needed - found.keys()):
             return f"{field}{missing[0]} is missing"
         parts = ((found[name], wanted[name], f"{field}{name}.") for name in found)
     elif isinstance(wanted, tuple) and isinstance(found, list):
