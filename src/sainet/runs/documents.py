@@ -3,7 +3,6 @@
 import errno
 import hashlib
 import json
-import math
 import os
 import stat
 import uuid
@@ -100,16 +99,6 @@ def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise error(f"{path}: must hold a JSON object, not a {type(value).__name__}.")
     return value
-
-
-def is_number(value: object) -> bool:
-    """Return whether a value from JSON is a finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer of hundreds of digits
-        return False
 
 
 def read_file(
