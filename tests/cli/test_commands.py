@@ -150,11 +150,11 @@ def test_an_unknown_command_is_a_usage_error():
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "verb"),
     [(Generate(out=Path("x")), "resumes"), (Bench(), "starts over")],
 )
 def test_an_interruption_names_the_command_that_resumes(
-    command, told, monkeypatch, capsys
+    command, verb, monkeypatch, capsys
 ):
     def stop(self):
         raise KeyboardInterrupt
@@ -162,7 +162,7 @@ def test_an_interruption_names_the_command_that_resumes(
     monkeypatch.setattr(type(command), "run", stop)
     monkeypatch.setattr(entry, "parse", lambda words: command)
     assert entry.run(["anything"]) == entry.INTERRUPTED
-    assert capsys.readouterr().err == f"sainet: interrupted; the same command {told}.\n"
+    assert capsys.readouterr().err == f"sainet: interrupted; the same command {verb}.\n"
 
 
 @pytest.fixture(scope="module")

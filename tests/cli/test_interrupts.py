@@ -54,8 +54,8 @@ def test_a_swallowed_interrupt_ends_the_command(
     monkeypatch.setattr(entry, "parse", lambda words: command)
     assert entry.run(["anything"]) == entry.INTERRUPTED
     assert len(done) == steps
-    told = "sainet: interrupted; the same command resumes.\n"
-    assert capsys.readouterr().err.endswith(told)
+    line = "sainet: interrupted; the same command resumes.\n"
+    assert capsys.readouterr().err.endswith(line)
 
 
 def test_the_next_command_in_this_process_is_not_interrupted():

@@ -77,11 +77,11 @@ def run(robot, **settings):
 
 
 def test_an_episode_ends_when_the_task_is_solved():
-    told = []
-    episode = run(Rail(), on_step=told.append)
+    steps = []
+    episode = run(Rail(), on_step=steps.append)
     # 50 mm in steps of 10 mm; within 5.9 mm after the fifth.
     assert (episode.reason, len(episode.steps)) == ("solved", 5)
-    assert told == episode.steps
+    assert steps == episode.steps
     np.testing.assert_allclose(
         distances(TASK, episode), [0.05, 0.04, 0.03, 0.02, 0.01, 0.0], atol=1e-6
     )
@@ -155,8 +155,8 @@ def test_a_model_without_finite_predictions_ends_the_episode():
     lost = eqx.tree_at(lambda task: task.goal, TASK, TASK.goal * jnp.nan)
     planner = GreedyPlanner(actions=FEW)
     episode = run_episode(Rail(), planner, MODEL, lost, scene())
-    told = "planning failed: model: none of the 6 candidate pushes is"
-    assert episode.reason.startswith(told)
+    reason = "planning failed: model: none of the 6 candidate pushes is"
+    assert episode.reason.startswith(reason)
     assert episode.steps == []
 
 

@@ -66,11 +66,11 @@ def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
     kept = episode_file(out, 0).stat().st_mtime_ns
     episode_file(out, 1).unlink()
     (out / SUMMARY).unlink()
-    told = []
-    again = run_trials(CONFIG, out, on_episode=told.append)
+    reported = []
+    again = run_trials(CONFIG, out, on_episode=reported.append)
     assert episode_file(out, 0).stat().st_mtime_ns == kept
     assert list(map(without_times, again)) == list(map(without_times, records))
-    assert told == again
+    assert reported == again
     with pytest.raises(RunConflict, match="pushes is 2, not 3"):
         run_trials(replace(CONFIG, pushes=3), out)
 
@@ -101,15 +101,15 @@ def test_an_episode_with_nan_is_recorded(tmp_path, monkeypatch):
 
     monkeypatch.setattr(SimulatedRobot, "push", diverge)
     config = replace(CONFIG, trials=1)
-    (told,) = run_trials(config, tmp_path / "out")
-    assert (told.solved, told.final_mm) == (False, None)
-    assert "NaN" in told.reason
-    assert told.steps[0].actual[0] == [[None] * 3] * 2
-    found = summarise([told])
+    (record,) = run_trials(config, tmp_path / "out")
+    assert (record.solved, record.final_mm) == (False, None)
+    assert "NaN" in record.reason
+    assert record.steps[0].actual[0] == [[None] * 3] * 2
+    found = summarise([record])
     assert (found["solved"], found["within_4_mm"]) == (0, 0.0)
     assert found["median_final_mm"] is None
     monkeypatch.setattr(trials, "run_episode", None)  # what is there is enough
-    assert run_trials(config, tmp_path / "out") == [told]
+    assert run_trials(config, tmp_path / "out") == [record]
 
 
 def test_a_network_trained_again_is_another_model(tmp_path):
@@ -246,8 +246,8 @@ def test_the_stopping_tolerance_may_be_below_the_tolerance(tmp_path, monkeypatch
         (judged,) = run_trials(config, tmp_path / str(stop))
         assert judged.tolerance_mm == pytest.approx(5.9)
         assert aimed[-1].tolerance == pytest.approx(stop * 0.1)
-    told = [read_json(tmp_path / name / CONFIG_FILE) for name in ("1.0", "0.8")]
-    assert [one["stopping_tolerance"] for one in told] == [1.0, 0.8]
+    settings = [read_json(tmp_path / name / CONFIG_FILE) for name in ("1.0", "0.8")]
+    assert [one["stopping_tolerance"] for one in settings] == [1.0, 0.8]
 
 
 @pytest.mark.parametrize(

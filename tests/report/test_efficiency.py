@@ -61,5 +61,20 @@ def test_only_trained_models_have_a_band(tmp_path):
 def test_one_disk_has_a_panel_of_each_error(tmp_path):
     text = draw_data_efficiency(table(bodies=(1,)), tmp_path / "a.svg").read_text()
     assert text.count(">Disk 1</text>") == 2
-    for told in ("position error (mm)", "rotation error (deg)"):
-        assert text.count(f">mean {told}</text>") == 1
+    for heading in ("position error (mm)", "rotation error (deg)"):
+        assert text.count(f">mean {heading}</text>") == 1
+
+
+def test_where_only_ends_are_known_the_figure_says_so(tmp_path):
+    whole = table(bodies=(1,))
+    rows = [
+        msgspec.structs.replace(
+            row,
+            values={f"final_{k}": row.values[k] for k in ("pos_mm", "rot_deg")},
+        )
+        for row in whole.rows
+    ]
+    ends = msgspec.structs.replace(whole, rows=tuple(rows))
+    text = draw_data_efficiency(ends, tmp_path / "a.svg").read_text()
+    assert text.count(">mean final position error (mm)</text>") == 1
+    assert text.count(">mean final rotation error (deg)</text>") == 1

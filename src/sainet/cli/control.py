@@ -34,7 +34,7 @@ class Control:
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
-        """Run the trials and say how they went."""
+        """Run the trials and print their outcome."""
         use_cache()
         from sainet.control.trials import measure_trials, prepare, run_trials
         from sainet.evaluation.trials import trial_rows
@@ -104,10 +104,10 @@ def _outcome(config: ControlConfig, found: "TrialRow") -> str:
 def _command(config: ControlConfig) -> str:
     """Return the command that these settings come from."""
     usual = ControlConfig()
-    told = [
+    options = [
         word
         for name, value in asdict(config).items()
         if value != getattr(usual, name)
         for word in (f"--{name.replace('_', '-')}", str(value))
     ]
-    return shlex.join(["sainet", "control", *told, "--animate"])
+    return shlex.join(["sainet", "control", *options, "--animate"])

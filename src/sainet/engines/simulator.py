@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 UNIFORM_PRESSURE = (
     2 / 3
 )  # mean distance of the pressure from the centre over the radius
-_DIGEST = 8  # characters that tell specifications without a name apart
+_DIGEST = 8  # characters that distinguish specifications without a name
 
 
 class Assumptions(msgspec.Struct, frozen=True, kw_only=True):

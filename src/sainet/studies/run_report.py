@@ -16,7 +16,7 @@ from sainet.runs.manifest import MANIFEST
 from sainet.studies.study import TABLE, Result
 
 _EPISODES = 6  # that play
-# The figures that commands leave in their folders, and what one sees there.
+# The figures that commands leave in their folders, and their captions.
 _FIGURES = {
     "learning-curve": "The loss while the network learned.",
     "paths": "Predicted paths of one push against the true one.",
@@ -24,7 +24,7 @@ _FIGURES = {
     "episodes": "Shapes at the start (faint) and at the end, and the goal.",
     "data-efficiency": "Errors over training pushes, as many iterations for all.",
     "recorded-data-efficiency": "Errors over recorded training pushes.",
-    "engine-errors": "What engines miss of the end of a push: by place and direction.",
+    "engine-errors": "Errors of engines at the end of a push, by place and direction.",
 }
 
 
@@ -41,7 +41,7 @@ def report_of(folder: Path) -> Report:
     table = read_document(found, Result).summary if found.is_file() else None
     card = msgspec.to_builtins(read_card(folder)) if (folder / CARD).is_file() else {}
     is_identified = (folder / IDENTIFIED).is_file()
-    said = _estimates(read_identified(folder)) if is_identified else ()
+    sentences = _estimates(read_identified(folder)) if is_identified else ()
     episodes = [read_record(path) for path in episode_files(folder)[:_EPISODES]]
     figures = tuple(_figures(folder))
     if not (table or card or is_identified or episodes or figures):
@@ -52,7 +52,7 @@ def report_of(folder: Path) -> Report:
     return Report(
         title=folder.resolve().name,
         subtitle=f"Output of 'sainet {command}'" if command else "",
-        summary="\n\n".join(said),
+        summary="\n\n".join(sentences),
         table=table,
         figures=figures,
         episodes=episodes,
@@ -62,7 +62,7 @@ def report_of(folder: Path) -> Report:
 
 
 def is_of_demo(folder: Path) -> bool:
-    """Whether the demo made the folder: its report says more than this one would."""
+    """Whether the demo made the folder: its own report contains more."""
     return (
         _json(folder / CONFIG).get("command") == "demo" and (folder / REPORT).exists()
     )
@@ -88,9 +88,9 @@ def _json(path: Path) -> dict[str, object]:
 
 
 def _figures(folder: Path) -> Iterator[tuple[Path, str]]:
-    for name, told in _FIGURES.items():
+    for name, caption in _FIGURES.items():
         if (folder / f"{name}.svg").is_file():
-            yield folder / f"{name}.svg", told
+            yield folder / f"{name}.svg", caption
 
 
 def _estimates(identified: Identified) -> Iterator[str]:

@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from sainet.evaluation.metrics import METRICS
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.report.figures.canvas import (
     LineLook,
@@ -54,7 +53,13 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         for row in summary.rows
         if row.condition in sizes
     ]
-    end = "final " if any(METRICS[f.metric].is_of_end for f in summary.factors) else ""
+    # Where only the ends of pushes were observed, no mean over a push differs from them.
+    same = (
+        _estimate(row, m) == row.values.get(f"final_{m}")
+        for _, row in rows
+        for m in _METRICS
+    )
+    end = "final " if all(same) else ""
     styles = styles_of((each.row.model for each in rows), summary.models)
     bodies = sorted({each.row.body for each in rows})
     cases = [(metric, body) for metric in _METRICS for body in bodies]
