@@ -53,13 +53,10 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         for row in summary.rows
         if row.condition in sizes
     ]
-    # Where only the ends of pushes were observed, no mean over a push differs from them.
-    same = (
-        _estimate(row, m) == row.values.get(f"final_{m}")
-        for _, row in rows
-        for m in _METRICS
-    )
-    end = "final " if all(same) else ""
+    # Where only the ends of pushes were observed, no mean over a push is another.
+    means = ((row.values, m) for _, row in rows for m in _METRICS)
+    ends = all(v.get(m) in (None, v.get(f"final_{m}")) for v, m in means)
+    end = "final " if ends else ""
     styles = styles_of((each.row.model for each in rows), summary.models)
     bodies = sorted({each.row.body for each in rows})
     cases = [(metric, body) for metric in _METRICS for body in bodies]
