@@ -179,7 +179,13 @@ NO_FLAGS = {
 BELOW_CLI = [tree for p, tree in TREES.items() if not {p, p.parent} & NO_FLAGS]
 TOOLS = sorted((REPOSITORY / "tools").glob("*.py"))
 # What later issues add has limits of its own.
-ROBOTS = ("robots/", "engines/mujoco/", "studies/lab", "control/collect")
+ROBOTS = (
+    "robots/lab",
+    "robots/wire",
+    "engines/mujoco/",
+    "studies/lab",
+    "control/collect",
+)
 ADDED = [p for p in MODULES if p.relative_to(SOURCE).as_posix().startswith(ROBOTS)]
 REBUILT = [path for path in MODULES if path not in ADDED]
 # How to count, the limit today, and the target. A limit is lowered, never raised.
