@@ -57,6 +57,17 @@ class Rail(AbstractRobot):
         self.state, self.step, self.trouble = touching(), step, trouble
         self.left = stops_after
 
+    @property
+    def scene(self):
+        return scene()
+
+    @property
+    def truth(self):
+        return self.state
+
+    def arrange(self, state):
+        self.state = state
+
     def observe(self):
         return self.state
 

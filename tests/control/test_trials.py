@@ -94,7 +94,7 @@ def test_a_damaged_episode_is_named_with_a_remedy(tmp_path, done, text, says):
 
 def test_an_episode_with_nan_is_recorded(tmp_path, monkeypatch):
     def diverge(self, push):
-        self.truth = jax.tree.map(lambda x: x * np.nan, self.truth)
+        self.arrange(jax.tree.map(lambda x: x * np.nan, self.truth))
         lost = np.full((PUSH_STEPS + 1, 2, 3), np.nan, np.float32)
         time = np.arange(PUSH_STEPS + 1.0)
         return Recording(time=time, pose=lost, pusher=lost[:, 0, :2], commanded=push)

@@ -72,3 +72,12 @@ def test_a_push_that_starts_inside_a_disk_is_reported():
     backwards = eqx.tree_at(lambda p: p.contact_angle, PUSH, jnp.float32(np.pi))
     trouble = made.push(backwards).trouble
     assert trouble == "the pusher began 9.6 mm inside disk 2"
+
+
+def test_disks_lie_at_rest_where_they_are_arranged():
+    made, wanted = robot(), touching()
+    made.observe()
+    made.push(PUSH)
+    made.arrange(eqx.tree_at(lambda s: s.spin, wanted, wanted.spin + 1))
+    assert eqx.tree_equal(made.truth, wanted)
+    np.testing.assert_array_equal(made.observe().position, wanted.position)

@@ -8,6 +8,7 @@ import numpy as np
 from sainet.control.config import ControlConfig
 from sainet.engines import make_engine
 from sainet.engines.simulator import PAPER
+from sainet.robots.base import AbstractRobot
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.scene import Scene
 from sainet.tasks.goals import draw_goal
@@ -25,9 +26,9 @@ _WORLD = 0x3071D
 
 
 class Trial(NamedTuple):
-    """One goal and the simulated world of its episode."""
+    """One goal and the robot of its episode."""
 
-    robot: SimulatedRobot
+    robot: AbstractRobot
     task: PushToGoal
     scene: Scene  # properties given to model and task
 

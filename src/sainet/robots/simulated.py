@@ -29,15 +29,29 @@ class SimulatedRobot(AbstractRobot):
             state: poses of the disks.
         """
         self._world = world
-        self.scene = world.roughen(scene)
-        self.truth = state
+        self._scene = world.roughen(scene)
+        self._truth = state
         self._measured = state
+
+    @property
+    def scene(self) -> Scene:
+        """The true properties, with the friction of the rough table."""
+        return self._scene
+
+    @property
+    def truth(self) -> State:
+        """The true poses."""
+        return self._truth
+
+    def arrange(self, state: State) -> None:
+        """Put the disks and the pusher at these poses, at rest."""
+        self._truth = at_rest(state.position, state.angle, state.pusher_position)
 
     def observe(self) -> State:
         """Return the measured poses; velocities are zero."""
-        pose = jnp.asarray(self._world.capture(_pose(self.truth)[None, None])[0, 0])
+        pose = jnp.asarray(self._world.capture(_pose(self._truth)[None, None])[0, 0])
         self._measured = eqx.tree_at(
-            lambda s: (s.position, s.angle), self.truth, (pose[:, :2], pose[:, 2])
+            lambda s: (s.position, s.angle), self._truth, (pose[:, :2], pose[:, 2])
         )
         return self._measured
 
@@ -46,14 +60,14 @@ class SimulatedRobot(AbstractRobot):
         # In the engine's batches: one scene, one push.
         scene, measured, truth, one = jax.tree.map(
             lambda x: jnp.asarray(x)[None],
-            (self.scene, self._measured, self.truth, push),
+            (self._scene, self._measured, self._truth, push),
         )
         plain = eqx.tree_at(lambda s: s.friction_field, scene, None)
         planned, controls = self._world.setup.command(plain, measured, one, PUSH_STEPS)
         initial = at_rest(truth.position, truth.angle, planned.pusher_position)
         states = self._world.execute(scene, initial, controls).states
         end = jax.tree.map(lambda x: x[0, -1], states)
-        self.truth = at_rest(end.position, end.angle, end.pusher_position)
+        self._truth = at_rest(end.position, end.angle, end.pusher_position)
         before, after = jax.tree.map(lambda x: np.asarray(x)[0], (initial, states))
         pose = np.concatenate([_pose(before)[None], _pose(after)])
         path = [before.pusher_position[None], after.pusher_position]
