@@ -1,0 +1,196 @@
+"""The robot of a virtual lab, behind the interface of physical robots."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sainet.robots.base import AbstractRobot
+from sainet.robots.lab.hidden import PUSHER_RADIUS, Lab
+from sainet.robots.lab.mechanics import TICK, Mechanics, Motion
+from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.recording import Conditions, Recording
+from sainet.scenes.scene import Scene
+from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.state import State, at_rest
+
+CLEARANCE = 0.003  # m, between the pusher and disk 1 when it has descended
+APPROACH = 0.03  # m/s
+_WAIT = 0.15  # s, before the push, so that the arm has arrived
+_HOLD = 0.5  # s, after the push, so that the disks come to rest
+_FRAMES = 10  # of motion capture, whose mean is an observation
+_TILT = np.deg2rad(5)
+_PLACED = (5e-4, np.deg2rad(1))  # m, rad: standard deviation of a person's hand
+_TOUCHING = 1e-3  # m: disks that are meant to touch are closer than this
+_LOOSE = 2e-4  # m: largest gap of disks that a person pushed together
+_GENERATOR = 0x1ABF0
+
+
+class LabRobot(AbstractRobot):
+    """Executes pushes in a virtual lab and observes them by motion capture.
+
+    The tracker's frame is the table frame. The robot assumes that its own is the same:
+    the difference is one of the lab's hidden errors.
+    """
+
+    def __init__(self, lab: Lab, state: State, *, seed: int = 0) -> None:
+        """Put the disks on the table.
+
+        Args:
+            lab: with all hidden parameters.
+            state: where a person puts the disks, as `arrange`.
+            seed: of noise, equal seeds give equal recordings.
+
+        Raises:
+            MissingExtra: MuJoCo is not installed.
+        """
+        self._lab = lab
+        self._mechanics = Mechanics(lab)
+        self._rng = np.random.default_rng([_GENERATOR, lab.number, seed])
+        self._pose = np.zeros((len(lab.disks), 3))  # in the robot's frame
+        self.arrange(state)
+
+    @property
+    def scene(self) -> Scene:
+        """Masses and radii as people can measure them, and usual frictions."""
+        disks = self._lab.disks
+        return Scene.disks(
+            [disk.mass for disk in disks],
+            [disk.radius for disk in disks],
+            pusher_radius=PUSHER_RADIUS,
+        )
+
+    @property
+    def truth(self) -> State:
+        """Poses in the table frame without noise."""
+        return _state(self._lab.capture.seen(self._pose))
+
+    def arrange(self, state: State) -> None:
+        """Have a person put the disks there, who pushes those together that touch."""
+        rng, (place, angle) = self._rng, _PLACED
+        wanted = np.concatenate([state.position, state.angle[..., None]], -1)
+        pose = wanted + rng.standard_normal(wanted.shape) * [place, place, angle]
+        radii = [disk.radius for disk in self._lab.disks]
+        for i in range(1, len(pose)):
+            for j in range(i):
+                reach = radii[i] + radii[j]
+                apart = np.linalg.norm(wanted[i, :2] - wanted[j, :2])
+                between = pose[i, :2] - pose[j, :2]
+                distance = float(np.linalg.norm(between))
+                if abs(apart - reach) < _TOUCHING or distance < reach:
+                    exact = reach + rng.uniform(0, _LOOSE)
+                    pose[i, :2] = pose[j, :2] + between * exact / distance
+        self._pose = self._lab.capture.unseen(pose)
+
+    def observe(self) -> State:
+        """Return the measured poses: the mean of a few frames."""
+        frames = np.repeat(self._pose[None], _FRAMES, 0)
+        self._measured = _state(self._captured(frames).mean(0))
+        return self._measured
+
+    def push(self, push: Push) -> Recording:
+        """Approach disk 1 along its normal, wait, push and hold.
+
+        The recording begins after the approach.
+        """
+        start, normal, heading = self._plan(push)
+        if trouble := self._blocked(start - CLEARANCE * normal):
+            still = self._captured(self._pose[None])
+            return self._kept(push, np.zeros(1), still, start[None], trouble)
+        approach = np.minimum(
+            APPROACH * _ticks(CLEARANCE / APPROACH + _WAIT), CLEARANCE
+        )
+        before = start + np.multiply.outer(approach - CLEARANCE, normal)
+        length, speed = float(push.length), float(push.speed)
+        stroke = np.minimum(speed * _ticks(length / speed + _HOLD), length)
+        command = np.concatenate([before, start + np.multiply.outer(stroke, heading)])
+        motion = self._move(command)
+        self._pose = motion.pose[0, -1]
+        return self._recording(push, motion, len(before))
+
+    def _plan(self, push: Push) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the pusher's start, the contact normal and the push direction."""
+        scene, state, push = jax.tree.map(
+            jnp.asarray, (self.scene, self._measured, push)
+        )
+        start = np.asarray(place_pusher(scene, state, push), np.float64)
+        normal = np.asarray(state.position[0], np.float64) - start
+        heading = np.asarray(push_direction(state, push), np.float64)
+        return start, normal / np.linalg.norm(normal), heading
+
+    def _blocked(self, place: Float[np.ndarray, " 2"]) -> str:
+        """Return which disk the pusher would descend on; empty: none."""
+        state = self._measured
+        state = at_rest(state.position, state.angle, jnp.asarray(place, jnp.float32))
+        gaps = np.asarray(pusher_gaps(self.scene, state))
+        if gaps.min() > 0:
+            return ""
+        return f"the pusher would descend on disk {1 + int(gaps.argmin())}"
+
+    def _move(self, command: Float[np.ndarray, "tick 2"]) -> Motion:
+        """Move the arm along its commands, late and beside them."""
+        lab, rng = self._lab, self._rng
+        late = np.arange(len(command)) - round(lab.arm.delay / TICK)
+        path = command[np.maximum(late, 0)] + lab.arm.error * rng.standard_normal(2)
+        x, y, angle = self._pose[0]
+        side = float(np.arctan2(y - path[0, 1], x - path[0, 0]) - angle)
+        scatter = lab.push_variation
+        friction = lab.pusher_friction * lab.disks[0].rim_friction(side)
+        friction *= np.exp(scatter * rng.standard_normal() - scatter**2 / 2)
+        return self._mechanics.run(self._pose[None], path[None], np.array([friction]))
+
+    def _recording(self, push: Push, motion: Motion, begin: int) -> Recording:
+        """Return what robot and tracker recorded, each at its own times."""
+        capture = self._lab.capture
+        clock = TICK * (np.arange(motion.pose.shape[1]) - begin)
+        first = self._rng.uniform(0, 1 / capture.rate)
+        frames = np.append(0, np.arange(first, clock[-1], 1 / capture.rate) + TICK / 8)
+        true = motion.pose[0].reshape(len(clock), -1).T
+        seen = np.stack([np.interp(frames - capture.delay, clock, x) for x in true], -1)
+        moving = clock >= 0
+        time = np.union1d(clock[moving], frames)
+        pose = np.full((len(time), len(self._pose), 3), np.nan)
+        pose[np.searchsorted(time, frames)] = self._captured(
+            seen.reshape(len(frames), -1, 3)
+        )
+        pusher = np.full((len(time), 2), np.nan)
+        pusher[np.searchsorted(time, clock[moving])] = motion.pusher[0, moving]
+        trouble = "" if motion.tilt[0] < _TILT else "a disk tilted"
+        return self._kept(push, time, pose, pusher, trouble)
+
+    def _kept(
+        self,
+        push: Push,
+        time: Float[np.ndarray, " sample"],
+        pose: Float[np.ndarray, "sample body 3"],
+        pusher: Float[np.ndarray, "sample 2"],
+        trouble: str,
+    ) -> Recording:
+        speed = 1000 * float(push.speed)
+        return Recording(
+            time=time,
+            pose=pose,
+            pusher=pusher,
+            commanded=push,
+            conditions=Conditions(surface=self._lab.surface, speed_mm_s=speed),
+            trouble=trouble,
+        )
+
+    def _captured(
+        self, pose: Float[np.ndarray, "sample body 3"]
+    ) -> Float[np.ndarray, "sample body 3"]:
+        """Return measured poses of true ones, with noise."""
+        capture = self._lab.capture
+        size = np.array([capture.noise, capture.noise, capture.noise_angle])
+        noise = size * self._rng.standard_normal(pose.shape)
+        return capture.seen(pose) + noise
+
+
+def _ticks(duration: float) -> Float[np.ndarray, " tick"]:
+    """Return the times at the ends of all ticks of a duration (s)."""
+    return TICK * np.arange(1, int(np.ceil(duration / TICK)) + 1)
+
+
+def _state(pose: Float[np.ndarray, "body 3"]) -> State:
+    single = jnp.asarray(pose, jnp.float32)
+    return at_rest(single[:, :2], single[:, 2], jnp.zeros(2, jnp.float32))
