@@ -26,6 +26,7 @@ STUDIES = {
     "fine-tuning": "sainet.studies.fine_tuning:STUDY",
     "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
     "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",
+    "lab-realism": "sainet.studies.lab_realism:STUDY",
 }
 
 

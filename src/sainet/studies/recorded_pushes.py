@@ -110,11 +110,11 @@ class EndErrors(Step[EndOffsets]):
     """Signed errors of an engine at the ends of pushes."""
 
     model: Step[Model]
-    pushes: Given
+    pushes: Step[Store]
 
     def run(self, runner: "Runner") -> EndOffsets:
         """Return the errors."""
-        return end_offsets(runner.result(self.model), self.pushes.store)
+        return end_offsets(runner.result(self.model), runner.result(self.pushes))
 
 
 def _plan(scope: Scope) -> Plan:

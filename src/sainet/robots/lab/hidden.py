@@ -4,7 +4,7 @@ No model is given them. The ranges were fixed before any network was evaluated i
 docs/virtual-lab.md names the source of each.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -172,6 +172,13 @@ class Capture:
             found = found + pose - self.seen(found)
         return found
 
+    def measured(
+        self, rng: np.random.Generator, pose: Float[np.ndarray, "*batch 3"]
+    ) -> Float[np.ndarray, "*batch 3"]:
+        """Return measured poses, from poses in the robot's frame."""
+        size = np.array([self.noise, self.noise, self.noise_angle])
+        return self.seen(pose) + size * rng.standard_normal(pose.shape)
+
 
 @dataclass(frozen=True)
 class Lab:
@@ -185,7 +192,20 @@ class Lab:
     push_variation: float
     disk_friction: float
     arm: Arm
-    capture: Capture = field(repr=False)
+    capture: Capture
+
+    def friction_of_push(
+        self,
+        rng: np.random.Generator,
+        pose: Float[np.ndarray, " 3"],
+        pusher: Float[np.ndarray, " 2"],
+    ) -> float:
+        """Draw the friction between the pusher and disk 1 where they will touch."""
+        x, y, angle = pose
+        side = float(np.arctan2(y - pusher[1], x - pusher[0]) - angle)
+        mean = self.pusher_friction * self.disks[0].rim_friction(side)
+        scatter = self.push_variation
+        return mean * float(np.exp(scatter * rng.standard_normal() - scatter**2 / 2))
 
 
 def draw_lab(number: int, surface: Surface, *, order: tuple[int, ...] = (0, 1)) -> Lab:

@@ -15,7 +15,7 @@ from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, at_rest
 
 CLEARANCE = 0.003  # m, between the pusher and disk 1 when it has descended
-APPROACH = 0.03  # m/s
+_APPROACH = 0.03  # m/s
 _WAIT = 0.15  # s, before the push, so that the arm has arrived
 _HOLD = 0.5  # s, after the push, so that the disks come to rest
 _FRAMES = 10  # of motion capture, whose mean is an observation
@@ -85,7 +85,7 @@ class LabRobot(AbstractRobot):
     def observe(self) -> State:
         """Return the measured poses: the mean of a few frames."""
         frames = np.repeat(self._pose[None], _FRAMES, 0)
-        self._measured = _state(self._captured(frames).mean(0))
+        self._measured = _state(self._lab.capture.measured(self._rng, frames).mean(0))
         return self._measured
 
     def push(self, push: Push) -> Recording:
@@ -95,12 +95,9 @@ class LabRobot(AbstractRobot):
         """
         start, normal, heading = self._plan(push)
         if trouble := self._blocked(start - CLEARANCE * normal):
-            still = self._captured(self._pose[None])
+            still = self._lab.capture.measured(self._rng, self._pose[None])
             return self._kept(push, np.zeros(1), still, start[None], trouble)
-        approach = np.minimum(
-            APPROACH * _ticks(CLEARANCE / APPROACH + _WAIT), CLEARANCE
-        )
-        before = start + np.multiply.outer(approach - CLEARANCE, normal)
+        before = start + np.multiply.outer(approach() - CLEARANCE, normal)
         length, speed = float(push.length), float(push.speed)
         stroke = np.minimum(speed * _ticks(length / speed + _HOLD), length)
         command = np.concatenate([before, start + np.multiply.outer(stroke, heading)])
@@ -132,11 +129,7 @@ class LabRobot(AbstractRobot):
         lab, rng = self._lab, self._rng
         late = np.arange(len(command)) - round(lab.arm.delay / TICK)
         path = command[np.maximum(late, 0)] + lab.arm.error * rng.standard_normal(2)
-        x, y, angle = self._pose[0]
-        side = float(np.arctan2(y - path[0, 1], x - path[0, 0]) - angle)
-        scatter = lab.push_variation
-        friction = lab.pusher_friction * lab.disks[0].rim_friction(side)
-        friction *= np.exp(scatter * rng.standard_normal() - scatter**2 / 2)
+        friction = lab.friction_of_push(rng, self._pose[0], path[0])
         return self._mechanics.run(self._pose[None], path[None], np.array([friction]))
 
     def _recording(self, push: Push, motion: Motion, begin: int) -> Recording:
@@ -150,8 +143,8 @@ class LabRobot(AbstractRobot):
         moving = clock >= 0
         time = np.union1d(clock[moving], frames)
         pose = np.full((len(time), len(self._pose), 3), np.nan)
-        pose[np.searchsorted(time, frames)] = self._captured(
-            seen.reshape(len(frames), -1, 3)
+        pose[np.searchsorted(time, frames)] = self._lab.capture.measured(
+            self._rng, seen.reshape(len(frames), -1, 3)
         )
         pusher = np.full((len(time), 2), np.nan)
         pusher[np.searchsorted(time, clock[moving])] = motion.pusher[0, moving]
@@ -176,14 +169,10 @@ class LabRobot(AbstractRobot):
             trouble=trouble,
         )
 
-    def _captured(
-        self, pose: Float[np.ndarray, "sample body 3"]
-    ) -> Float[np.ndarray, "sample body 3"]:
-        """Return measured poses of true ones, with noise."""
-        capture = self._lab.capture
-        size = np.array([capture.noise, capture.noise, capture.noise_angle])
-        noise = size * self._rng.standard_normal(pose.shape)
-        return capture.seen(pose) + noise
+
+def approach() -> Float[np.ndarray, " tick"]:
+    """Return how far the pusher has come from its clearance (m); then it waits."""
+    return np.minimum(_APPROACH * _ticks(CLEARANCE / _APPROACH + _WAIT), CLEARANCE)
 
 
 def _ticks(duration: float) -> Float[np.ndarray, " tick"]:
