@@ -54,9 +54,10 @@ format: setup-dev  ## Rewrite the sources the way `make check` wants them
 	$(BIN)/ruff check --fix
 	$(BIN)/ruff format
 
-# KEEP='FOLDER ...' first puts the measurements of these studies into results/.
+# KEEP='PATH ...' first puts evidence into results/: folders of studies and of
+# 'sainet identify', and files with the JSON of 'sainet bench'.
 pages: setup  ## Render docs/results/, figures and README.md from results/
-	$(BIN)/python -m sainet.report.pages.results $(KEEP)
+	$(BIN)/python -m sainet.studies.pages $(KEEP)
 
 bench: setup-dev  ## Run the benchmarks
 	$(BIN)/sainet bench

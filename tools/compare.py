@@ -1,4 +1,4 @@
-"""Compare what two trees make: datasets, the JSON of commands, numbers on pages.
+"""Compare what two trees make: datasets, and the JSON of commands.
 
     python tools/compare.py BASE [--tolerance 1e-6] [--recorded ENDPOINTS.csv]
 
@@ -11,11 +11,9 @@ import argparse
 import json
 import math
 import os
-import re
 import subprocess
 import sys
 import tempfile
-from collections import Counter
 from collections.abc import Iterator
 from hashlib import sha256
 from pathlib import Path
@@ -30,8 +28,6 @@ RENAMED = {
     f"{name}-calibrated": f"{name}-true"
     for name in ("physics", "sain", "planar", "bullet")
 }
-# Renamed sections of pages: {"results: old title": "results: new title"}.
-TITLES: dict[str, str] = {}
 # Keys of JSON that are not compared: times, and what BASE lacks.
 EXEMPT = {"median_decision_s"}
 _STORE = "--pushes 60 --chunk-size 30 --seed 7 --out"
@@ -69,8 +65,6 @@ def main() -> int:
                 words = command.replace("RECORDED", str(chosen.recorded)).split()
                 made = (_run(*place, words) for place in places)
                 differ |= _print(command, _first(*made, tolerance=chosen.tolerance))
-    for title, difference in _pages(base):
-        differ |= _print(title, difference)
     return int(differ)
 
 
@@ -141,30 +135,6 @@ def _first(one: dict[str, Any], other: dict[str, Any], *, tolerance: float) -> s
         if not (math.isclose(was, now, rel_tol=tolerance) if near else was == now):
             return f"{name} was {was} and is {now}"
     return ""
-
-
-def _pages(base: Path) -> Iterator[tuple[str, str]]:
-    """Yield each section of BASE's pages and how its numbers changed."""
-    old, new = _sections(base), _sections(ROOT)
-    for title, numbers in old.items():
-        found = new.get(TITLES.get(title, title), Counter())
-        lost, added = ([*(numbers - found)], [*(found - numbers)])
-        changed = f"gone {len(lost)} {lost[:5]}, new {len(added)} {added[:5]}"
-        yield title, changed if lost or added else ""
-
-
-def _sections(tree: Path) -> dict[str, Counter[str]]:
-    """Return how often each number stands in each section of the rendered pages."""
-    found: dict[str, Counter[str]] = {}
-    results = (page for page in tree.glob("docs/**/*.md") if "results" in str(page))
-    for page in (tree / "README.md", *sorted(results)):
-        text = _renamed(page.read_text("utf-8")).replace("−", "-").replace(",", "")
-        for part in re.split(r"^## ", text, flags=re.MULTILINE):
-            title, _, _ = part.partition("\n")
-            found[f"{page.stem}: {title}"] = Counter(
-                re.findall(r"-?\d+(?:\.\d+)?", part)
-            )
-    return found
 
 
 if __name__ == "__main__":

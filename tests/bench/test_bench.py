@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 import time
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,7 @@ import jax.numpy as jnp
 import pytest
 from jax.extend.core import ClosedJaxpr, Jaxpr
 
-from sainet.bench import CASES, load_case
+from sainet.bench import CASES
 from sainet.bench import training as training_case
 from sainet.bench.peer import (
     TorchPeer,
@@ -26,15 +27,17 @@ from sainet.bench.peer import (
 from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import ceiling_gflops, median_seconds
 from sainet.bench.training import TrainingLoop, counted_gflop
-from sainet.cli.bench import Bench
+from sainet.cli.bench import Bench, bench_commands
 from sainet.cli.output import Output
 from sainet.learning.step import trained_layers, with_layers
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.features import feature_set
 from sainet.models.inputs import Drive, Still, in_columns
 from sainet.runs.errors import BadInput, SainetError, UnknownName
+from sainet.runs.names import load_named
 
 TIME_STEP = 1 / 240
+load_case = partial(load_named, "benchmark", CASES)
 
 
 def network_of(kind: str, *, augmented: bool) -> InteractionNetwork:
@@ -231,6 +234,16 @@ def test_figures_of_several_cases_are_separate_objects(monkeypatch):
     with pytest.raises(UnknownName, match="plannin"):
         Bench(cases=("engines", "plannin"), output=quiet).run()
     assert len(ran) == 3  # nothing is measured when a name is wrong
+
+
+def test_whole_commands_run_to_their_end_in_a_folder_of_their_own(tmp_path):
+    found = bench_commands(2, ("sainet --help", "sainet generate --help"))
+    assert found.pop("runs") == 2
+    assert len(found) == 2 and all(seconds > 0.01 for seconds in found.values())
+    with pytest.raises(subprocess.CalledProcessError):
+        bench_commands(1, (f"sainet report {tmp_path / 'nothing'}",))
+    with pytest.raises(BadInput, match="runs` is 0"):
+        bench_commands(0)
 
 
 def test_listing_the_cases_does_not_import_jax():

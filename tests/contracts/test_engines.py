@@ -476,7 +476,7 @@ def test_coinciding_disks_and_zero_friction_give_no_nan(name):
     same = same.at[:6, 2].set(start.pusher_position[:6])
     start = eqx.tree_at(lambda s: s.position, start, same)
     trajectory = roll_out(engine(name), scene, start, controls)
-    assert np.asarray(trajectory.is_finite).all()
+    assert np.isfinite(pack_motion(trajectory.states)).all()
     assert np.abs(trajectory.states.position).max() < 1
 
 

@@ -265,15 +265,15 @@ def test_stored_predictions_replace_the_engine(simulated):
     ],
 )
 def test_other_predictions_are_not_taken_from_the_store(simulated, internal):
-    assert simulated.prediction(InternalEngine(PlanarSpec())).is_stored
-    assert not simulated.prediction(internal).is_stored
+    assert Prediction(InternalEngine(PlanarSpec()), simulated.info).is_stored
+    assert not Prediction(internal, simulated.info).is_stored
 
 
 def test_a_later_engine_has_another_name_in_datasets(simulated, monkeypatch):
     later = PlanarSpec(version=2)
     monkeypatch.setattr(simulator, "SIMULATORS", {"planar": later})
     assert later.slug == "planar"
-    assert not simulated.prediction(InternalEngine(later)).is_stored
+    assert not Prediction(InternalEngine(later), simulated.info).is_stored
     with pytest.raises(UnknownName, match="No simulator named 'planar'"):
         stored_simulator("planar")
 

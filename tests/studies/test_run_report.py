@@ -69,9 +69,9 @@ def test_identified_parameters_are_in_the_report(tmp_path):
     found |= {"format_version": 2, "engine": {"simulator": {"engine": "planar"}}}
     write_json(tmp_path / "identified.json", found)
     page = page_of(tmp_path)
-    assert "Pusher friction: 0.31 [0.3, 0.32], initially 0.25." in page
+    assert "Pusher friction: 0.31 (0.3 to 0.32), initially 0.25." in page
     assert "spin is not identifiable: it never spins." in page
-    assert "Mean errors of 12 pushes: position 2.00 mm before" in page
+    assert "Mean errors where 12 pushes were observed: position 2.00 mm before" in page
 
 
 def test_hidden_content_of_a_figure_is_left_out(tmp_path):

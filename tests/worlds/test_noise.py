@@ -25,13 +25,8 @@ def generator():
 
 
 def test_walk_has_its_deviation_and_correlation_time():
-    walk = ornstein_uhlenbeck(
-        generator(),
-        (4000, 240, 2),
-        deviation=0.3,
-        correlation_time=0.1,
-        time_step=TIME_STEP,
-    )
+    noise = NoiseConfig(correlation_time=0.1)
+    walk = ornstein_uhlenbeck(generator(), (4000, 240, 2), 0.3, noise, TIME_STEP)
     late = walk[:, 200]
     assert late.std() == pytest.approx(0.3, rel=0.03)
     assert late.mean() == pytest.approx(0, abs=0.015)

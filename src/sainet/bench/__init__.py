@@ -4,9 +4,7 @@ Figures compare measurements of the same run, because the speed of shared machin
 drifts; `docs/benchmarks.md` defines each figure.
 """
 
-from collections.abc import Callable, Mapping
-
-from sainet.runs.names import load_named
+from collections.abc import Mapping
 
 Figures = Mapping[str, float | str | None]  # by name; None where not measured
 
@@ -16,12 +14,3 @@ CASES = {
     "planning": "sainet.bench.planning:bench_planning",
     "training": "sainet.bench.training:bench_training",
 }
-
-
-def load_case(name: str) -> Callable[..., Figures]:
-    """Return the function of a case; its argument `runs` is the number of measurements.
-
-    Raises:
-        UnknownName: no case has this name.
-    """
-    return load_named("benchmark", CASES, name)

@@ -1,11 +1,60 @@
-"""`sainet bench`."""
+"""`sainet bench`, and the time of whole commands."""
 
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from tyro.conf import Positional
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output
+
+if TYPE_CHECKING:
+    from sainet.bench import Figures
+
+# In this order: the training run reads the pushes of the second command.
+COMMANDS = (
+    "sainet --help",
+    "sainet generate robot --pushes 4500 --out pushes",
+    "sainet generate robot --pushes 4500 --engine bullet "
+    "--assumed-engine bullet planar --out bullet",
+    "sainet train sain --data pushes --out network",
+    "sainet demo --out demo",
+)
+_WHOLE = {"commands": "sainet.cli.bench:bench_commands"}
+
+
+def bench_commands(runs: int = 3, commands: Sequence[str] = COMMANDS) -> "Figures":
+    """Return the time of whole commands, each a new process (s).
+
+    Args:
+        runs: number of measurements, for the median; each in a new folder.
+        commands: later ones may read the output of earlier ones.
+    """
+    from sainet.bench.timing import check_runs
+
+    check_runs(runs)
+    seconds: dict[str, list[float]] = {command: [] for command in commands}
+    for _ in range(runs):
+        with TemporaryDirectory() as folder:
+            for command in commands:
+                seconds[command].append(_seconds(command, Path(folder)))
+    return {k: median(found) for k, found in seconds.items()} | {"runs": runs}
+
+
+def _seconds(command: str, folder: Path) -> float:
+    _, *words = shlex.split(command)
+    line = [sys.executable, "-m", "sainet", *words]
+    start = time.perf_counter()
+    subprocess.run(line, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,7 +62,8 @@ class Bench:
     """Measure the speed of training, engines and planning on this machine."""
 
     cases: Positional[tuple[str, ...]] = ()
-    """Benchmark cases: training, engines, planning. Default: all."""
+    """Benchmark cases: training, engines, planning, and commands, which takes an hour.
+    Default: all but commands."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
@@ -28,10 +78,12 @@ class Bench:
         use_devices(self.devices)
         from rich.text import Text
 
-        from sainet.bench import CASES, Figures, load_case
+        from sainet.bench import CASES
+        from sainet.runs.names import load_named
 
         # Every name is looked up before anything is measured.
-        cases = {name: load_case(name) for name in self.cases or tuple(CASES)}
+        names, known = self.cases or tuple(CASES), {**CASES, **_WHOLE}
+        cases = {name: load_named("benchmark", known, name) for name in names}
         figures: dict[str, Figures] = {}
         for name, case in cases.items():
             self.output.say(f"Measuring {name} ...")

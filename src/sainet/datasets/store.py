@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from jaxtyping import Int, UInt64
@@ -25,12 +25,6 @@ from sainet.runs.digests import BYTES
 from sainet.runs.documents import content_hash, read_document, read_file, readable
 from sainet.runs.errors import BadInput, BadStore, hint, shown
 from sainet.runs.folders import remake
-
-if TYPE_CHECKING:
-    import xarray
-
-    from sainet.datasets.batch import Prediction
-    from sainet.engines.simulator import InternalEngine
 
 
 @dataclass(frozen=True)
@@ -142,13 +136,6 @@ class Store:
     def _is_prefix(self) -> bool:
         return self.rows is None or self.rows == tuple(range(len(self.rows)))
 
-    def to_xarray(self) -> "xarray.Dataset":
-        """Return the dataset as a lazy xarray dataset with dimensions and units."""
-        import xarray
-
-        whole = xarray.open_zarr(self.path / ARRAYS, consolidated=False, chunks=None)
-        return whole if self.rows is None else whole.isel(push=list(self.rows))
-
     def push_hashes(self) -> UInt64[np.ndarray, " push"]:
         """Return a hash of where each push started and of its command.
 
@@ -160,12 +147,6 @@ class Store:
         parts = [info.chunk_slice(index) for index in range(info.chunks)]
         read = (self.read(part, tuple(known)) for part in parts)
         return np.concatenate([_hash_pushes(arrays, known) for arrays in read])
-
-    def prediction(self, internal: "InternalEngine") -> "Prediction":
-        """Return the simulator prediction of an internal engine for these pushes."""
-        from sainet.datasets.batch import Prediction
-
-        return Prediction(internal, self.info)
 
     @property
     def content(self) -> str:

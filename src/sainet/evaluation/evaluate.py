@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.batch import Prediction, PushBatch, to_batch
 from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
@@ -191,7 +191,7 @@ def _predict_all(
     store, arrays = pushes.store, pushes.arrays
     poses: list[np.ndarray] = []
     stored = None
-    if model.internal and (known := store.prediction(model.internal)).is_stored:
+    if model.internal and (known := Prediction(model.internal, store.info)).is_stored:
         arrays = arrays | store.read(slice(None), (known.name,))
         stored = model.internal.simulator.stored_as
     for part, steps in pushes.parts:

@@ -80,7 +80,7 @@ class Task:
 
     @property
     def _prediction(self) -> Prediction:
-        return self.store.prediction(self.assumed)
+        return Prediction(self.assumed, self.store.info)
 
     @property
     def features(self) -> FeatureSet:

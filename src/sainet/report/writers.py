@@ -4,7 +4,7 @@ import csv
 import html
 import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rich import box
@@ -12,15 +12,15 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from sainet.models.card import Identified
+from sainet.models.card import Estimate, Identified
 from sainet.report import WRITERS
 from sainet.report.pages import render
 from sainet.report.palette import styles_of
-from sainet.report.table import EMPTY, Cell, Column, Line, Table
+from sainet.report.table import DASH, EMPTY, Cell, Column, Line, Table
 from sainet.runs.documents import write_bytes
 
 _ANY_WIDTH = 10_000  # characters
-_ESTIMATE_HEADINGS = ("parameter", "before", "value", "95 % interval")
+ESTIMATE_HEADINGS = ("parameter", "before", "value", "95 % interval")
 
 
 def print_table(table: Table, console: Console) -> None:
@@ -112,29 +112,33 @@ def print_estimates(found: Identified, console: Console) -> None:
         console: to print on.
     """
     table = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
-    for index, heading in enumerate(_ESTIMATE_HEADINGS):
+    for index, heading in enumerate(ESTIMATE_HEADINGS):
         table.add_column(heading, justify="right" if index else "left")
     for estimate in found.estimates:
-        is_known = not estimate.doubt
-        interval = f"{estimate.low:.3g} to {estimate.high:.3g}"
-        cells = (
-            estimate.name.replace("_", " "),
-            f"{estimate.start:.3g}",
-            f"{estimate.value:.3g}" if is_known else "kept",
-            interval if is_known else "–",
-        )
-        table.add_row(*map(Text, cells))
+        table.add_row(*map(Text, estimate_cells(estimate)))
     console.print(table)
+    for sentence in estimate_sentences(found):
+        console.print(Text(sentence))
+
+
+def estimate_cells(found: Estimate) -> tuple[str, str, str, str]:
+    """Return the cells of an estimate, one for each of the headings."""
+    name, before = found.name.replace("_", " "), f"{found.start:.3g}"
+    if found.doubt:
+        return name, before, "kept", DASH
+    return name, before, f"{found.value:.3g}", f"{found.low:.3g} to {found.high:.3g}"
+
+
+def estimate_sentences(found: Identified) -> Iterator[str]:
+    """Yield why parameters are not identifiable, then the errors before and after."""
     for estimate in found.estimates:
         if estimate.doubt:
             name = estimate.name.replace("_", " ")
-            console.print(Text(f"{name} is not identifiable: {estimate.doubt}."))
-    console.print(
-        Text(
-            f"Mean errors where {found.pushes} pushes were observed: position "
-            f"{found.before_mm:.2f} mm before, {found.after_mm:.2f} mm after; "
-            f"rotation {found.before_deg:.2f} and {found.after_deg:.2f} degrees."
-        )
+            yield f"{name} is not identifiable: {estimate.doubt}."
+    yield (
+        f"Mean errors where {found.pushes} pushes were observed: position "
+        f"{found.before_mm:.2f} mm before, {found.after_mm:.2f} mm after; "
+        f"rotation {found.before_deg:.2f} and {found.after_deg:.2f} degrees."
     )
 
 

@@ -6,7 +6,7 @@ Units are metres, radians, kilograms and seconds, in the table frame.
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
 
@@ -61,15 +61,6 @@ class Trajectory(eqx.Module):
     def final(self) -> State:
         """The state after the last step."""
         return _at_step(self.states, -1)
-
-    @property
-    def is_finite(self) -> Bool[Array, "*batch time"]:
-        """Whether poses and velocities of all disks are finite, for each step."""
-        states = self.states
-        pose = jnp.isfinite(states.position).all((-1, -2))
-        motion = jnp.isfinite(states.velocity).all((-1, -2))
-        turn = jnp.isfinite(states.angle + states.spin).all(-1)
-        return pose & motion & turn
 
 
 def _at_step(states: State, step: int) -> State:

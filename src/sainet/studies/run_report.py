@@ -9,6 +9,7 @@ import msgspec
 from sainet.control.record import episode_files, read_record
 from sainet.models.card import CARD, IDENTIFIED, Identified, read_card, read_identified
 from sainet.report.pages.page import REPORT, Report, to_page
+from sainet.report.writers import estimate_cells, estimate_sentences
 from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
@@ -96,19 +97,10 @@ def _figures(folder: Path) -> Iterator[tuple[Path, str]]:
 def _estimates(identified: Identified) -> Iterator[str]:
     """Yield estimates and errors, in sentences."""
     for estimate in identified.estimates:
-        name = estimate.name.replace("_", " ")
-        if estimate.doubt:
-            yield f"{name} is not identifiable: {estimate.doubt}."
-        else:
-            yield (
-                f"{name.capitalize()}: {estimate.value:.3g} [{estimate.low:.3g}, "
-                f"{estimate.high:.3g}], initially {estimate.start:.3g}."
-            )
-    yield (
-        f"Mean errors of {identified.pushes} pushes: position "
-        f"{identified.before_mm:.2f} mm before, {identified.after_mm:.2f} mm after; "
-        f"rotation {identified.before_deg:.2f} and {identified.after_deg:.2f} degrees."
-    )
+        if not estimate.doubt:
+            name, before, value, interval = estimate_cells(estimate)
+            yield f"{name.capitalize()}: {value} ({interval}), initially {before}."
+    yield from estimate_sentences(identified)
 
 
 def _way_out(folder: Path) -> str:

@@ -15,7 +15,6 @@ from sainet.evaluation.measurements import Measurements, PublishedValues
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.report.figures.engine_errors import draw_engine_errors
-from sainet.report.pages.results import AS_TRAINED, MEASUREMENTS
 from sainet.runs.documents import write_bytes, write_document, write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
@@ -25,6 +24,8 @@ from sainet.studies.runner import Runner
 from sainet.studies.steps import Step, Train
 
 TABLE = "table.json"
+MEASUREMENTS, AS_TRAINED = "measurements.nc", "as-trained.nc"
+ENGINE_ERRORS = "engine-errors.svg"
 STEPS = "steps"  # folder of the run folders that studies share
 
 
@@ -54,6 +55,20 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     start: str | None = None
     change: Change | None = None  # to the defaults
     scores: dict[str, float] | None = None  # by robot
+
+    @property
+    def cells(self) -> dict[str, str]:
+        """The settings and the scores in words, by the headings of a table."""
+        found: dict[str, str] = {}
+        if self.l2 is not None:
+            found["l2"] = f"{self.l2:g}"
+        if self.start is not None:
+            changes = msgspec.to_builtins(self.change or Change()).items()
+            words = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in changes)
+            found["pushes"] = str(self.pushes)
+            found["way"] = f"from `{self.start}`, {words or 'the defaults'}"
+        scores = {**(self.scores or {}), "score": self.score}
+        return found | {name: f"{value:.3f}" for name, value in scores.items()}
 
 
 class Ruling(msgspec.Struct, frozen=True):
@@ -112,11 +127,7 @@ class Scope:
 Need = Callable[[Scope], object]  # raises what is missing
 
 
-def _bullet(scope: Scope) -> None:
-    make_engine("bullet")
-
-
-BULLET: Need = _bullet
+BULLET: Need = lambda scope: make_engine("bullet")  # noqa: E731
 RECORDED: Need = Scope.recorded_pushes
 
 
@@ -201,7 +212,7 @@ class Study:
             self.figure(summary, out / self.figure_name)
         if plan.engine_errors:
             cases = {k: runner.result(v) for k, v in plan.engine_errors.items()}
-            draw_engine_errors(cases, out / "engine-errors.svg")
+            draw_engine_errors(cases, out / ENGINE_ERRORS)
         for step in plan.networks:
             _copy(runner.folder(step), out / "networks" / step.id.slug)
         _write(name, result, scope, out)

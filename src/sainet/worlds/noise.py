@@ -19,6 +19,11 @@ from sainet.scenes.quantities import (
 
 FRICTION_FEATURES = 32
 NoiseLevel = Literal["none", "default", "paper-like"]
+# Scaled by a level.
+_SIZES = (
+    *("tracking_mm", "force_fraction", "friction_fraction"),
+    *("capture_mm", "capture_deg"),
+)
 _FACTOR = {"none": 0.0, "default": 1.0, "paper-like": 3.0}
 _QUANTITIES = {
     "tracking_mm": LENGTH_DEVIATION.times(1000, "mm"),
@@ -59,22 +64,14 @@ class NoiseConfig:
 def at_level(noise: NoiseConfig, level: NoiseLevel) -> NoiseConfig:
     """Return the noise with its sizes at a named level: 0, 1 or 3 times."""
     factor = _FACTOR[level]
-    return replace(
-        noise,
-        tracking_mm=factor * noise.tracking_mm,
-        force_fraction=factor * noise.force_fraction,
-        friction_fraction=factor * noise.friction_fraction,
-        capture_mm=factor * noise.capture_mm,
-        capture_deg=factor * noise.capture_deg,
-    )
+    return replace(noise, **{name: factor * getattr(noise, name) for name in _SIZES})
 
 
 def ornstein_uhlenbeck(
     rng: np.random.Generator,
     shape: tuple[int, int, int],
-    *,
     deviation: float,
-    correlation_time: float,
+    noise: NoiseConfig,
     time_step: float,
 ) -> Float[np.ndarray, "push time axis"]:
     """Return an Ornstein-Uhlenbeck process that starts at zero.
@@ -83,13 +80,13 @@ def ornstein_uhlenbeck(
         rng: random generator.
         shape: pushes, steps and axes; axes are independent.
         deviation: stationary standard deviation, in the unit of the result.
-        correlation_time: s.
+        noise: has the correlation time.
         time_step: s.
     """
     # Imported here: the import takes half a second, which other commands can skip.
     from scipy.signal import lfilter
 
-    keep = np.exp(-time_step / correlation_time)
+    keep = np.exp(-time_step / noise.correlation_time)
     kick = deviation * np.sqrt(1 - keep**2) * rng.standard_normal(shape)
     return np.asarray(lfilter([1.0], [1.0, -keep], kick, axis=1))
 
@@ -101,13 +98,8 @@ def tracking_error(
     time_step: float,
 ) -> Float[np.ndarray, "push time 2"]:
     """Return tracking errors of the pusher (m), constant while the pusher holds."""
-    error = ornstein_uhlenbeck(
-        rng,
-        (*moving.shape, 2),
-        deviation=noise.tracking_mm / 1000,
-        correlation_time=noise.correlation_time,
-        time_step=time_step,
-    )
+    shape, deviation = (*moving.shape, 2), noise.tracking_mm / 1000
+    error = ornstein_uhlenbeck(rng, shape, deviation, noise, time_step)
     last_moving = np.maximum.accumulate(
         np.where(moving, np.arange(moving.shape[1]), 0), axis=1
     )
@@ -121,13 +113,8 @@ def force_error(
     time_step: float,
 ) -> Float[np.ndarray, "push time 2"]:
     """Return errors of the force on the pusher (N)."""
-    error = ornstein_uhlenbeck(
-        rng,
-        force.shape,
-        deviation=noise.force_fraction,
-        correlation_time=noise.correlation_time,
-        time_step=time_step,
-    )
+    deviation = noise.force_fraction
+    error = ornstein_uhlenbeck(rng, force.shape, deviation, noise, time_step)
     return error * np.linalg.norm(force, axis=-1, keepdims=True)
 
 

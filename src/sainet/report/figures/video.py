@@ -26,7 +26,6 @@ from sainet.report.palette import INK, TARGET
 from sainet.runs.documents import atomic_path
 from sainet.runs.errors import MissingExtra
 
-FORMATS = (".mp4", ".gif")
 _PIXELS = (960, 544)  # multiples of 16, as encoders require
 _DOTS_PER_INCH = 100
 _HOLD = 20  # frames that show the end

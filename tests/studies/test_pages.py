@@ -6,17 +6,14 @@ import shutil
 import pytest
 
 from sainet.evaluation.measurements import read_measurements
-from sainet.report.pages.results import (
-    BEGIN,
-    END,
-    MEASUREMENTS,
-    TEMPLATES,
-    keep,
-    rendered,
-    with_block,
-)
-from sainet.runs.documents import write_json
+from sainet.models.card import IDENTIFIED
+from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput
+from sainet.runs.manifest import MANIFEST, manifest
+from sainet.studies import STUDIES, load_study
+from sainet.studies.evidence import Evidence, keep
+from sainet.studies.pages import BEGIN, END, TEMPLATES, rendered, with_block
+from sainet.studies.study import ENGINE_ERRORS, MEASUREMENTS
 from support import REPOSITORY
 
 # Digits may stand outside rendered blocks in code, links, versions, years, tables and
@@ -80,14 +77,14 @@ def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
         (tmp_path / name).mkdir(parents=True)
     for name in ("readme-block", "benchmarks"):
         text = (
-            "{% set title = 'Timings' %}{{ plain('benchmarks') }}"
+            "{% set title = 'Timings' %}{{ bench('training') }}"
             if name == "benchmarks"
             else name
         )
         (tmp_path / TEMPLATES / f"{name}.md.j2").write_text(text)
     index = "{% for name, title in titles.items() %}{{ name }}: {{ title }}{% endfor %}"
     (tmp_path / TEMPLATES / "index.md.j2").write_text(index)
-    shutil.copy(REPOSITORY / "results" / "benchmarks.tables.json", tmp_path / "results")
+    shutil.copy(REPOSITORY / "results" / "bench-training.json", tmp_path / "results")
     (tmp_path / "README.md").write_text(f"{BEGIN}{END}")
     pages = {path.name: text for path, text in rendered(tmp_path).items()}
     assert pages["README.md"] == f"{BEGIN}readme-block\n{END}"
@@ -95,14 +92,46 @@ def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
     assert pages["index.md"] == "benchmarks.md: Timings\n"
 
 
+def test_a_page_states_every_claim_of_its_study():
+    pages = rendered(REPOSITORY)
+    for name in STUDIES:
+        path = REPOSITORY / "docs" / "results" / f"{name}.md"
+        for claim in load_study(name).claims if path in pages else ():
+            assert f"Claim: {claim.text}. Verdict: " in pages[path], name
+
+
 def test_measurements_of_a_study_are_kept_at_published_precision(tmp_path):
     folder, root = tmp_path / "engine-parity-quick", tmp_path / "repository"
     whole = read_measurements(REPOSITORY / "results" / "engine-parity.nc.xz")
     whole.write(folder / MEASUREMENTS)
     write_json(folder / "config.json", {"study": "engine-parity"})
+    (folder / ENGINE_ERRORS).write_text("<svg/>")
     keep(folder, root)
     (kept,) = (root / "results").iterdir()
     assert kept.name == "engine-parity.nc.xz"
     assert read_measurements(kept).to_bytes() == whole.to_bytes()
+    assert (root / "docs" / "figures" / ENGINE_ERRORS).read_text() == "<svg/>"
     with pytest.raises(BadInput, match="config.json"):
         keep(tmp_path / "no-study", root)
+
+
+def test_identified_parameters_are_kept_by_group(tmp_path):
+    one = Evidence(REPOSITORY).identifications()["abs-10"]
+    write_document(tmp_path / "abs-10" / IDENTIFIED, one.found)
+    write_document(tmp_path / "abs-10" / MANIFEST, manifest())
+    keep(tmp_path / "abs-10", tmp_path)
+    (again,) = Evidence(tmp_path).identifications().items()
+    assert again[0] == "abs-10" and again[1].found == one.found
+
+
+def test_figures_of_benchmarks_are_kept_case_by_case(tmp_path):
+    path = tmp_path / "bench.json"
+    path.write_text('Measuring ...\n{"engines": {"batch": 3, "bullet_ratio": null}}\n')
+    keep(path, tmp_path)
+    found = Evidence(tmp_path).benchmark("engines")
+    assert found.figures == {"batch": 3, "bullet_ratio": None}
+    assert str(manifest().processor) in found.machine
+    for text in ("", "{}x", '{"batch": 3}', "[1]"):
+        path.write_text(text)
+        with pytest.raises(BadInput, match=r"bench.json: no figures by case \("):
+            keep(path, tmp_path)

@@ -1,0 +1,125 @@
+"""Evidence: what `results/` keeps of studies, identifications and benchmarks."""
+
+from pathlib import Path
+
+import msgspec
+
+from sainet.evaluation.measurements import read_measurements
+from sainet.evaluation.summary import Summary, summarise
+from sainet.models.card import IDENTIFIED, Identified, read_identified
+from sainet.runs.documents import (
+    read_document,
+    read_file,
+    read_json,
+    write_bytes,
+    write_document,
+)
+from sainet.runs.errors import BadInput
+from sainet.runs.folders import CONFIG
+from sainet.runs.manifest import MANIFEST, Manifest, manifest
+from sainet.studies import STUDIES, load_study
+from sainet.studies.study import AS_TRAINED, ENGINE_ERRORS, MEASUREMENTS
+
+RESULTS, FIGURES = "results", "docs/figures"
+_IDENTIFIED = "identified"  # folder of documents
+
+
+class Benchmark(msgspec.Struct, frozen=True):
+    """The figures of a benchmark case, and where they were taken."""
+
+    figures: dict[str, float | str | None]
+    machine: str
+    note: str = ""
+
+
+class Identification(msgspec.Struct, frozen=True):
+    """Parameters identified on a group of pushes, and where."""
+
+    found: Identified
+    manifest: Manifest
+
+
+class Evidence:
+    """The summaries of studies, and other documents, in the folder ``results``."""
+
+    def __init__(self, root: Path) -> None:
+        """Look for evidence in the folder ``results`` of a repository."""
+        self.folder = root / RESULTS
+        self._summaries: dict[str, Summary] = {}
+
+    def summary(self, name: str) -> Summary:
+        """Return the summary of the measurements of a study, or of others."""
+        if name not in self._summaries:
+            measured = self.folder / f"{name}.nc.xz"
+            summary = load_study(name).summarise if name in STUDIES else summarise
+            self._summaries[name] = (
+                summary(read_measurements(measured))
+                if measured.is_file()
+                # Of version 0.1.0, until the study is measured again.
+                else read_document(self.folder / f"{name}.json", Summary)
+            )
+        return self._summaries[name]
+
+    def benchmark(self, case: str) -> Benchmark:
+        """Return the figures of a benchmark case."""
+        return read_document(self.folder / f"bench-{case}.json", Benchmark)
+
+    def identifications(self) -> dict[str, Identification]:
+        """Return the parameters identified on each group of recorded pushes."""
+        paths = sorted((self.folder / _IDENTIFIED).glob("*.json"))
+        return {path.stem: read_document(path, Identification) for path in paths}
+
+
+def described(machine: Manifest) -> str:
+    """Return processor, cores and versions in words."""
+    known = ", ".join(f"{k} {v}" for k, v in machine.versions.items() if v)
+    return f"{machine.processor}, {machine.cores} cores; {known}"
+
+
+def keep(path: Path, root: Path) -> None:
+    """Keep evidence in ``results/``: measurements at published precision.
+
+    Args:
+        path: the folder of a study or of an identification, or the JSON of `sainet
+            bench`, made on this machine.
+        root: the repository.
+
+    Raises:
+        BadInput: there is nothing to keep.
+    """
+    results = root / RESULTS
+    if path.is_file():
+        for case, figures in _cases(path).items():
+            write_document(results / f"bench-{case}.json", figures)
+        return
+    if (path / IDENTIFIED).is_file():
+        made = read_document(path / MANIFEST, Manifest)
+        found = Identification(read_identified(path), made)
+        write_document(results / _IDENTIFIED / f"{path.name}.json", found)
+        return
+    study = read_json(path / CONFIG).get("study", path.name)
+    for file, name in ((MEASUREMENTS, f"{study}"), (AS_TRAINED, f"{study}-as-trained")):
+        if file == MEASUREMENTS or (path / file).is_file():
+            measured = read_measurements(path / file)
+            measured.compact().write(results / f"{name}.nc.xz")
+    if (path / ENGINE_ERRORS).is_file():
+        figure = (path / ENGINE_ERRORS).read_bytes()
+        write_bytes(root / FIGURES / ENGINE_ERRORS, figure)
+
+
+def _cases(path: Path) -> dict[str, Benchmark]:
+    """Return the cases in the JSON of `sainet bench`, the last line of its output.
+
+    Raises:
+        BadInput: the file does not contain figures by case.
+    """
+    try:
+        *_, last = read_file(path).splitlines()
+        found = msgspec.json.decode(last, type=dict[str, dict[str, float | str | None]])
+    except (ValueError, msgspec.MsgspecError) as error:
+        raise BadInput(
+            f"{path}: no figures by case ({error}); give the JSON of several cases of "
+            "'sainet bench'."
+        ) from None
+    machine = f"{described(manifest())}."
+    return {case: Benchmark(figures, machine) for case, figures in found.items()}
