@@ -1,8 +1,9 @@
 """The arm that is moved by ABB's Externally Guided Motion (EGM)."""
 
 import gc
+import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import final
 
 import numpy as np
@@ -95,7 +96,7 @@ class EgmArm(AbstractArm):
         try:
             watchdog, rest = self._ready()
             rows = self._limits.rows(rest.position, path)
-            with _no_garbage_collection():
+            with _undisturbed():
                 self._stream(rows, rest.orientation, watchdog, samples)
         except Stopped as stopped:
             return samples.stroke(str(stopped))
@@ -175,12 +176,19 @@ class EgmArm(AbstractArm):
 
 
 @contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Keep Python from pausing for garbage in the middle of a motion."""
-    was = gc.isenabled()
+def _undisturbed() -> Iterator[None]:
+    """Keep garbage collection and, where permitted, other processes from interrupting.
+
+    A thread of real-time priority that waits for messages takes little of a processor.
+    """
+    collected = gc.isenabled()
     gc.disable()
+    policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
     try:
         yield
     finally:
-        if was:
+        os.sched_setscheduler(0, policy, priority)
+        if collected:
             gc.enable()

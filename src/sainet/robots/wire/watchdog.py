@@ -105,7 +105,10 @@ class Watchdog:
         same = self._last is not None and bool((position == self._last.position).all())
         self._same = self._same + 1 if same else 0
         if self._same >= self._limits.age and self._moving >= self._limits.lag_cycles:
-            raise Stopped(f"frozen feedback: {self._same + 1} times {in_mm(position)}")
+            raise Stopped(
+                f"frozen feedback: {self._same + 1} messages in a row report "
+                f"{in_mm(position)}"
+            )
 
 
 def _distance(
