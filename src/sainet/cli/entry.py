@@ -21,6 +21,7 @@ from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
 from sainet.cli.import_ import Import
 from sainet.cli.output import finish
+from sainet.cli.record import Record
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.split import Split
@@ -32,6 +33,7 @@ from sainet.runs.interrupts import remembered_interrupts
 _COMMANDS = {
     "demo": Demo,
     "generate": Generate,
+    "record": Record,
     "import": Import,
     "split": Split,
     "add-bystander": AddBystander,
@@ -56,7 +58,7 @@ Start with 'sainet demo', which runs the whole method at small scale."""
 
 INTERRUPTED = 130
 # Commands that an identical call resumes.
-_RESUMABLE = (Demo, Generate, Import, Split, Train, Tune, Control, Reproduce)
+_RESUMABLE = (Demo, Generate, Record, Import, Split, Train, Tune, Control, Reproduce)
 
 
 def parse(words: Sequence[str]) -> Any:  # noqa: ANN401

@@ -1,32 +1,32 @@
-"""Settings of control trials, free of JAX."""
+"""Settings of control trials and collecting sessions, free of JAX."""
 
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from sainet.planning import PLANNERS
+from sainet.robots.config import RobotConfig
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import (
     ALIGNMENT,
     LARGEST_COUNT,
-    MOST_DISKS,
+    MOST_PUSHES,
     require_count,
 )
-from sainet.worlds.noise import NoiseLevel
 
 Goals = Literal["easy", "hard"]
 GivenProperties = Literal["true", "assumed"]
 _COUNTS = {
     "trials": (1, 1_000_000),
     "pushes": (1, 1_000_000),
-    "disks": (2, MOST_DISKS),
     "seed": (0, LARGEST_COUNT),
 }
 _LEAST_TOLERANCE = 1e-6  # of a radius
 
 
 @dataclass(frozen=True, kw_only=True)
-class ControlConfig:
-    """Model, world, goals and number of trials."""
+class ControlConfig(RobotConfig):
+    """Model, robot, goals and number of trials."""
 
     model: str = "sain"
     """Model that plans: physics, physics-true, a shipped network, or the run
@@ -36,16 +36,12 @@ class ControlConfig:
     either side)."""
     planner: str = "greedy"
     """Planner: greedy (the paper's search) or tree (every sequence of two pushes)."""
-    world: str = "planar"
-    """Engine of the simulated world: planar, or bullet as in the paper."""
     trials: int = 25
     """Number of trials, one goal each."""
     seed: int = 0
     """Random seed of goals, friction and noise, equal for all models."""
     pushes: int = 60
     """Maximum pushes per episode."""
-    disks: int = 2
-    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
     given_properties: GivenProperties = "true"
     """Masses and radii given to the network: true, or assumed (those of the internal
     engine)."""
@@ -59,18 +55,16 @@ class ControlConfig:
     deadline: float | None = None
     """Time limit of a decision of the tree planner (s), after which it returns the best
     plan so far. Default: none."""
-    noise_level: NoiseLevel = "default"
-    """Scale of the world's noise; paper-like is three times the default."""
 
     def __post_init__(self) -> None:
         """Check every setting."""
+        super().__post_init__()
         for name, (low, high) in _COUNTS.items():
             require_count(name, getattr(self, name), low=low, high=high)
         require_one_of("goals", self.goals, get_args(Goals))
         require_one_of(
             "given_properties", self.given_properties, get_args(GivenProperties)
         )
-        require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
         wanted = f"at least {_LEAST_TOLERANCE:g}, below 1"
         good = _LEAST_TOLERANCE <= self.tolerance < 1
         require(good, "tolerance", wanted, self.tolerance)
@@ -79,3 +73,43 @@ class ControlConfig:
         require(0 < stop <= 1, "stopping_tolerance", "above 0, at most 1", stop)
         late = self.deadline is None or 0 < self.deadline < math.inf
         require(late, "deadline", "positive and finite", self.deadline)
+
+
+_AREA_MM, _GAP_MM = (1.0, 10_000.0), (0.01, 100.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CollectConfig(RobotConfig):
+    """Robot, and the pushes that are collected with it."""
+
+    pushes: int = 1500
+    """Number of pushes to record."""
+    seed: int = 0
+    """Random seed of pushes, places and, in simulation, of the noise."""
+    repeats: int = 1
+    """Number of times that each push is made, from the same arranged poses."""
+    area_mm: float = 300.0
+    """Side of the square around the table's origin that the centres of the disks stay
+    in (mm)."""
+    gap_mm: float = 1.0
+    """Largest gap or overlap of neighbouring disks that counts as touching (mm)."""
+    planner: str | None = None
+    """Planner that chooses the pushes (greedy or tree), towards random goals. Default:
+    random pushes."""
+    model: str = "sain"
+    """Model with which pushes are planned."""
+    goals: Goals = "hard"
+    """Goals of planned pushes: easy or hard."""
+
+    def __post_init__(self) -> None:
+        """Check every setting."""
+        super().__post_init__()
+        for name in ("pushes", "repeats"):
+            require_count(name, getattr(self, name), high=MOST_PUSHES)
+        require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
+        for name, (low, high) in (("area_mm", _AREA_MM), ("gap_mm", _GAP_MM)):
+            value = getattr(self, name)
+            require(low <= value <= high, name, f"from {low:g} to {high:g}", value)
+        if self.planner is not None:
+            require_one_of("planner", self.planner, PLANNERS)
+        require_one_of("goals", self.goals, get_args(Goals))

@@ -18,7 +18,7 @@ from sainet.scenes.state import State
 from sainet.tasks.base import AbstractTask
 
 SOLVED = "solved"  # why most episodes end
-_MOST_TROUBLES = 3  # in a row
+MOST_TROUBLES = 3  # in a row
 # Largest differences between an executed push and the planned push.
 _TOLERANCES = (
     ("contact_angle", np.deg2rad(5), "rad"),
@@ -95,7 +95,7 @@ def run_episode(
         episode.steps.append(ControlStep(state, plan, recording, seconds))
         on_step(episode.steps[-1])
         troubles = troubles + 1 if recording.trouble else 0
-        if troubles == _MOST_TROUBLES:
+        if troubles == MOST_TROUBLES:
             return _end(episode, f"{recording.trouble}, {troubles} times in a row")
 
 

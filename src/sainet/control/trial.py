@@ -1,4 +1,4 @@
-"""Trials: a goal and the simulated world of one episode."""
+"""Trials: a goal and the robot of one episode."""
 
 from typing import NamedTuple
 
@@ -6,23 +6,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from sainet.control.config import ControlConfig
-from sainet.engines import make_engine
 from sainet.engines.simulator import PAPER
+from sainet.robots import make_robot
 from sainet.robots.base import AbstractRobot
-from sainet.robots.simulated import SimulatedRobot
+from sainet.robots.simulated import scene_of
 from sainet.scenes.scene import Scene
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
-from sainet.worlds.config import WorldConfig, bounds
-from sainet.worlds.noise import NoiseConfig, at_level
-from sainet.worlds.sampling import in_a_row
-from sainet.worlds.setups import RobotSetup
-from sainet.worlds.world import SimulatedWorld
 
-# True properties of the disks, which differ from the assumed properties.
-MASS = (0.9, 1.0)  # kg
-RADIUS = (0.054, 0.059)  # m
-_WORLD = 0x3071D
+_FRICTION = PAPER.table_friction or 0.0
 
 
 class Trial(NamedTuple):
@@ -34,16 +26,9 @@ class Trial(NamedTuple):
 
 
 def make_trial(config: ControlConfig, index: int) -> Trial:
-    """Return the world and the goal of one trial, equal for all models and planners."""
-    rng = np.random.default_rng([_WORLD, config.seed, index])
-    friction = float(rng.uniform(*bounds(WorldConfig.table_friction)))
-    true = _scene(MASS, RADIUS, config.disks, friction)
-    state = in_a_row(np.asarray(true.radius))
-    noise = at_level(NoiseConfig(), config.noise_level)
-    world = SimulatedWorld(
-        make_engine(config.world), RobotSetup(), noise, rng, np.float32
-    )
-    robot = SimulatedRobot(world, true, state)
+    """Return the robot and the goal of one trial, equal for all models and planners."""
+    robot = make_robot(config, config.seed, index)
+    true, state = robot.scene, robot.truth
     moved = config.disks - 1
     goal = draw_goal(
         config.goals,
@@ -56,19 +41,18 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
     task = PushToGoal(
         jnp.asarray(goal, jnp.float32), moved, config.tolerance, config.alignment
     )
-    mass, radius, friction = PAPER.mass, PAPER.radius, PAPER.table_friction
-    assert mass and radius and friction  # all are assumed
-    given = (mass, radius) if config.given_properties == "assumed" else (MASS, RADIUS)
-    return Trial(robot, task, _scene(*given, config.disks, friction))
+    given = assumed_frictions(true)
+    if config.given_properties == "assumed":
+        assert PAPER.mass and PAPER.radius  # both are assumed
+        given = scene_of(PAPER.mass, PAPER.radius, config.disks, _FRICTION)
+    return Trial(robot, task, given)
 
 
-def _scene(
-    mass: tuple[float, ...], radius: tuple[float, ...], disks: int, friction: float
-) -> Scene:
-    """Return a scene; disks beyond the second have the mean of both values."""
-
-    def each(values: tuple[float, ...]) -> tuple[float, ...]:
-        mean = sum(values) / len(values)
-        return (*values, *[mean] * disks)[:disks]
-
-    return Scene.disks(each(mass), each(radius), table_friction=friction)
+def assumed_frictions(scene: Scene) -> Scene:
+    """Return a scene with its masses and radii; models are given no true friction."""
+    return Scene.disks(
+        scene.mass.tolist(),
+        scene.radius.tolist(),
+        table_friction=_FRICTION,
+        pusher_radius=float(scene.pusher_radius),
+    )

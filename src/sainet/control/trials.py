@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -52,7 +52,7 @@ def run_trials(
         BadInput: the model is for other pushes, or an episode is damaged.
     """
     model, _ = prepare(config)  # report errors before any output
-    settings = {"command": "control", "weights": model.digest, **asdict(config)}
+    settings = {"command": "control", "weights": model.digest, **config.settings()}
     folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     files = [episode_file(out, trial) for trial in range(config.trials)]
     known = {index for index, path in enumerate(files) if path.is_file()}

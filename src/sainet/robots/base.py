@@ -1,6 +1,7 @@
 """The interface of robots."""
 
 from abc import ABC, abstractmethod
+from types import TracebackType
 
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
@@ -9,7 +10,22 @@ from sainet.scenes.state import State
 
 
 class AbstractRobot(ABC):
-    """A robot, which observes disks at rest and pushes disk 1."""
+    """A robot, which observes disks at rest and pushes disk 1.
+
+    As a context manager it closes its connections at the end.
+    """
+
+    def __enter__(self) -> "AbstractRobot":
+        """Return this robot."""
+        return self
+
+    def __exit__(  # noqa: B027
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close the connections, if there are any."""
 
     @property
     @abstractmethod
@@ -26,6 +42,17 @@ class AbstractRobot(ABC):
         """Have the disks put at these poses, at rest; only poses are used.
 
         People put the disks of a physical robot, so that later observations differ.
+        """
+
+    def resume(self, left: State | None, *seed: int) -> None:  # noqa: B027
+        """Continue where a push left the disks, with noise from these numbers.
+
+        A simulation goes on as if it had just executed that push. The disks of a
+        physical robot lie where they were left, so that it does nothing.
+
+        Args:
+            left: true poses after the push; None: the disks are arranged next.
+            seed: numbers from which the noise from here on is drawn.
         """
 
     @abstractmethod

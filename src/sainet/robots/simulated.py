@@ -1,19 +1,31 @@
 """A robot in a simulated world: rough table, noisy motion and noisy poses."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from sainet.engines import make_engine
 from sainet.robots.base import AbstractRobot
+from sainet.robots.config import RobotConfig
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, at_rest
+from sainet.worlds.config import WorldConfig, bounds
+from sainet.worlds.noise import NoiseConfig, at_level
+from sainet.worlds.sampling import in_a_row
+from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
 
+# True properties of the disks, which differ from the assumed properties.
+MASS = (0.9, 1.0)  # kg
+RADIUS = (0.054, 0.059)  # m
+_WORLD = 0x3071D
 PUSH_STEPS = 200  # 48 of motion; then the pusher holds while the disks come to rest
 
 
@@ -47,6 +59,12 @@ class SimulatedRobot(AbstractRobot):
         """Put the disks and the pusher at these poses, at rest."""
         self._truth = at_rest(state.position, state.angle, state.pusher_position)
 
+    def resume(self, left: State | None, *seed: int) -> None:
+        """Put the disks back where a push left them, and draw noise anew."""
+        self._world = replace(self._world, rng=_generator(*seed))
+        if left is not None:
+            self.arrange(left)
+
     def observe(self) -> State:
         """Return the measured poses; velocities are zero."""
         pose = jnp.asarray(self._world.capture(_pose(self._truth)[None, None])[0, 0])
@@ -56,7 +74,7 @@ class SimulatedRobot(AbstractRobot):
         return self._measured
 
     def push(self, push: Push) -> Recording:
-        """Push from where the disks were last measured."""
+        """Push from where the disks were last measured; record measured poses."""
         # In the engine's batches: one scene, one push.
         scene, measured, truth, one = jax.tree.map(
             lambda x: jnp.asarray(x)[None],
@@ -71,13 +89,42 @@ class SimulatedRobot(AbstractRobot):
         before, after = jax.tree.map(lambda x: np.asarray(x)[0], (initial, states))
         pose = np.concatenate([_pose(before)[None], _pose(after)])
         path = [before.pusher_position[None], after.pusher_position]
+        # A generator of their own: measured poses leave all other noise unchanged.
+        (rng,) = self._world.rng.spawn(1)
         return Recording(
             time=scene.time_step * np.arange(len(pose)),
-            pose=pose,
+            pose=replace(self._world, rng=rng).capture(pose[None])[0],
             pusher=np.concatenate(path),
             commanded=push,
             trouble=_start_trouble(plain, initial) or _trouble(pose),
         )
+
+
+def _generator(*seed: int) -> np.random.Generator:
+    return np.random.default_rng([_WORLD, *seed])
+
+
+def simulated_robot(config: RobotConfig, *seed: int) -> SimulatedRobot:
+    """Return a robot in a world whose friction and noise are drawn from numbers."""
+    rng = _generator(*seed)
+    friction = float(rng.uniform(*bounds(WorldConfig.table_friction)))
+    scene = scene_of(MASS, RADIUS, config.disks, friction)
+    noise = at_level(NoiseConfig(), config.noise_level)
+    engine = make_engine(config.world)
+    world = SimulatedWorld(engine, RobotSetup(), noise, rng, np.float32)
+    return SimulatedRobot(world, scene, in_a_row(np.asarray(scene.radius)))
+
+
+def scene_of(
+    mass: tuple[float, ...], radius: tuple[float, ...], disks: int, friction: float
+) -> Scene:
+    """Return a scene; disks beyond the listed ones have the mean of both values."""
+
+    def each(values: tuple[float, ...]) -> tuple[float, ...]:
+        mean = sum(values) / len(values)
+        return (*values, *[mean] * disks)[:disks]
+
+    return Scene.disks(each(mass), each(radius), table_friction=friction)
 
 
 _STILL = 1e-4  # m

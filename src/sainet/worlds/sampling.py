@@ -195,3 +195,30 @@ def in_a_row(radius: Float[np.ndarray, " body"]) -> State:
     return at_rest(
         _single(np.stack([x, 0 * x], axis=-1)), jnp.zeros(len(radius)), behind
     )
+
+
+def scattered(
+    rng: np.random.Generator, radius: Float[np.ndarray, " body"], side: float
+) -> State:
+    """Return disks at rest that touch in a row, anywhere in a square, turned at random.
+
+    Args:
+        rng: of the draws.
+        radius: of each disk, m.
+        side: of the square around the table's origin that has all centres, m.
+
+    Raises:
+        BadInput: the square is too small.
+    """
+    row = np.asarray(in_a_row(radius).position)
+    for _ in range(_ARRANGEMENTS):
+        axis, *own = rng.uniform(-np.pi, np.pi, 1 + len(radius))
+        along = np.array([np.cos(axis), np.sin(axis)])
+        position = row[:, :1] * along + rng.uniform(-side / 2, side / 2, 2)
+        if np.abs(position).max() <= side / 2:
+            behind = position[0] - 2 * radius[0] * along
+            return at_rest(_single(position), _single(np.array(own)), _single(behind))
+    raise BadInput(
+        f"`area_mm` is {1000 * side:g}: the disks could not be placed inside; give a "
+        "larger area."
+    )

@@ -1,0 +1,38 @@
+"""`sainet record`."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from sainet.cli.devices import use_cache
+from sainet.cli.output import Json, Output, progress_bar
+from sainet.control.config import CollectConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """Collect pushes with a robot, and make a dataset of them."""
+
+    config: CollectConfig = field(default_factory=CollectConfig)
+    out: Path
+    """Run folder to write, one file per push and the folder dataset; identical settings
+    resume."""
+    output: Output = field(default_factory=Output)
+
+    def run(self) -> Json:
+        """Record the pushes and import them."""
+        use_cache()
+        from sainet.control.collect import DATASET, collect, summary_of
+
+        bar = progress_bar("Pushing", self.config.pushes, self.output)
+        with bar as advance:
+            store = collect(
+                self.config, self.out, on_pushes=lambda pushes: advance(pushes, "")
+            )
+        found = summary_of(self.out)
+        for reason, count in found.troubles.items():
+            self.output.warn(f"{count} pushes are not in the dataset: {reason}.")
+        where = self.out / DATASET
+        self.output.say(f"{store.info.pushes} pushes are in {where}")
+        return {"out": str(self.out), "data": str(where), **msgspec.to_builtins(found)}
