@@ -190,6 +190,8 @@ ROBOTS = (
     "engines/mujoco/",
     "studies/lab",
     "control/collect",
+    "cli/record",
+    "robots/__init__",
 )
 ADDED = [p for p in MODULES if p.relative_to(SOURCE).as_posix().startswith(ROBOTS)]
 REBUILT = [path for path in MODULES if path not in ADDED]

@@ -14,8 +14,8 @@ import pytest
 from sainet.cli.entry import run
 from sainet.control import collect as module
 from sainet.control.collect import DATASET, SUMMARY, collect, push_file, summary_of
+from sainet.control.collected import read_push
 from sainet.control.config import CollectConfig
-from sainet.control.recordings import read_push
 from sainet.datasets.store import open_store
 from sainet.robots.simulated import SimulatedRobot
 from sainet.runs.errors import BadInput, BadSetting, RunConflict, SainetError

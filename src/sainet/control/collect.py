@@ -21,11 +21,15 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
+from sainet.control.collected import (
+    PushDocument,
+    import_recordings,
+    read_push,
+    write_push,
+)
 from sainet.control.config import CollectConfig
 from sainet.control.episode import MOST_TROUBLES, checked
-from sainet.control.recordings import PushDocument, read_push, write_push
 from sainet.control.trial import assumed_frictions
-from sainet.datasets.recorded.collected import import_recordings
 from sainet.datasets.store import Store, open_store
 from sainet.models.library import Model, load_model
 from sainet.planning import make_planner

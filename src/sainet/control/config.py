@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from sainet.planning import PLANNERS
-from sainet.robots.config import RobotConfig
+from sainet.robots import RobotConfig
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import (
     ALIGNMENT,

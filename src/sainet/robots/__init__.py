@@ -1,21 +1,76 @@
-"""Robots, which observe disks and execute pushes."""
+"""Robots, which observe disks and execute pushes, and their settings; free of JAX."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, get_args
 
+from sainet.runs.errors import require, require_one_of
 from sainet.runs.names import load_named
+from sainet.scenes.quantities import MOST_DISKS, require_count
+from sainet.worlds.noise import NoiseLevel
 
 if TYPE_CHECKING:
     from sainet.robots.base import AbstractRobot
-    from sainet.robots.config import RobotConfig
 
 ROBOTS = {
     "simulated": "sainet.robots.simulated:simulated_robot",
     "lab": "sainet.robots.lab.robot:lab_robot_of",
     "abb": "sainet.robots.wire.abb:abb_robot",
 }
+Surface = Literal["abs", "plywood"]
+_MOST_LABS = 1_000_000
+_PHYSICAL = "abb"
 
 
-def make_robot(config: "RobotConfig", *seed: int) -> "AbstractRobot":
+@dataclass(frozen=True, kw_only=True)
+class RobotConfig:
+    """What executes pushes: a simulated robot, a virtual lab, or a physical robot."""
+
+    robot: str = "simulated"
+    """Robot: simulated (by an engine of models), lab (a virtual lab, simulated in 3-D
+    by MuJoCo) or abb (a physical robot)."""
+    world: str = "planar"
+    """Engine of the simulated world: planar, or bullet as in the paper."""
+    disks: int = 2
+    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
+    noise_level: NoiseLevel = "default"
+    """Scale of the world's noise; paper-like is three times the default."""
+    lab: int = 0
+    """Number of the virtual lab, whose hidden properties are drawn from it."""
+    surface: Surface = "abs"
+    """Surface of the virtual lab: abs or plywood."""
+    swapped: bool = False
+    """Exchange the two disks of the virtual lab, so that the larger one is pushed."""
+    config: Path | None = None
+    """Configuration of the cell of the physical robot (TOML). Default: none."""
+
+    def __post_init__(self) -> None:
+        """Check every setting."""
+        require_one_of("robot", self.robot, ROBOTS)
+        require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
+        require_one_of("surface", self.surface, get_args(Surface))
+        require_count("disks", self.disks, low=2, high=MOST_DISKS)
+        require_count("lab", self.lab, low=0, high=_MOST_LABS)
+        two = self.robot == "simulated" or self.disks == 2  # noqa: PLR2004
+        require(two, "disks", "2 unless `robot` is simulated", self.disks)
+        known = self.is_physical == (self.config is not None)
+        wanted = f"the file of a cell if `robot` is {_PHYSICAL}, and left out otherwise"
+        require(known, "config", wanted, self.config)
+        still = not self.swapped or self.robot == "lab"
+        require(still, "swapped", "false unless `robot` is lab", self.swapped)
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether the robot exists: it cannot be made twice, nor be set back."""
+        return self.robot == _PHYSICAL
+
+    def settings(self) -> Mapping[str, object]:
+        """Return every setting as a JSON value, for run folders."""
+        return asdict(self) | {"config": self.config and str(self.config)}
+
+
+def make_robot(config: RobotConfig, *seed: int) -> "AbstractRobot":
     """Return the robot of these settings.
 
     Args:

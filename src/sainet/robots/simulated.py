@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.engines import make_engine
+from sainet.robots import RobotConfig
 from sainet.robots.base import AbstractRobot
-from sainet.robots.config import RobotConfig
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene
