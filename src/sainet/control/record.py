@@ -10,6 +10,7 @@ import numpy as np
 from sainet.control.config import ControlConfig
 from sainet.control.episode import ControlStep, Episode
 from sainet.control.trial import Trial
+from sainet.datasets.recorded.resample import pusher_track
 from sainet.runs.documents import read_document
 from sainet.runs.errors import BadInput, shown
 from sainet.runs.folders import remake
@@ -21,6 +22,7 @@ from sainet.scenes.quantities import (
     Friction,
     Size,
 )
+from sainet.scenes.recording import Recording
 from sainet.scenes.state import State
 
 SUMMARY = "episodes.json"
@@ -169,6 +171,7 @@ def episode_files(out: Path) -> list[Path]:
 
 def _step(trial: Trial, step: ControlStep) -> StepRecord:
     recording, plan = step.recording, step.plan
+    pose, pusher = _drawn(recording)
     push = recording.commanded or plan.pushes[0]
     return StepRecord(
         contact_angle_deg=_degrees(push.contact_angle),
@@ -183,10 +186,20 @@ def _step(trial: Trial, step: ControlStep) -> StepRecord:
         looked_at=plan.looked_at,
         is_complete=plan.is_complete,
         warnings=list(plan.warnings),
-        actual=_poses(recording.pose[_EVERY::_EVERY]),
-        pusher=_mm(recording.pusher[_EVERY::_EVERY]),
+        actual=_poses(pose),
+        pusher=_mm(pusher),
         trouble=recording.trouble or None,
     )
+
+
+def _drawn(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Return some poses of the disks, and the pusher at their times."""
+    pose, pusher = recording.pose, recording.pusher
+    known = np.isfinite(pose).all(axis=(1, 2))
+    if not known.all() and known.any():  # the disks have a clock of their own
+        pose = pose[known]
+        pusher = pusher_track(recording).at(recording.time[known])
+    return pose[_EVERY::_EVERY], pusher[_EVERY::_EVERY]
 
 
 def poses_of(state: State) -> np.ndarray:
