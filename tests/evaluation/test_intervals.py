@@ -1,16 +1,16 @@
-"""Intervals of a cross-validation: whole folds are drawn, then their pushes."""
+"""Intervals over folds and labs: whole ones are drawn, then their pushes."""
 
 import numpy as np
 import pytest
 
-from sainet.evaluation.intervals import Sample
+from sainet.evaluation.intervals import Folds, Sample
 
 
 def test_pushes_of_one_fold_are_correlated():
     """Folds that differ by nothing but their mean: resampling pushes misses it."""
     rng = np.random.default_rng(0)
-    folds = tuple(np.repeat(np.arange(5), 40).tolist())
-    values = (np.array(folds) + rng.normal(0, 0.1, 200))[:, None]
+    folds = Folds(tuple(np.repeat(np.arange(5), 40).tolist()))
+    values = (np.array(folds.of_push) + rng.normal(0, 0.1, 200))[:, None]
     for told in (None, folds):
         mean, low, high = Sample(values, told).interval
         assert mean[0] == pytest.approx(values.mean())
@@ -20,8 +20,46 @@ def test_pushes_of_one_fold_are_correlated():
 
 def test_intervals_of_equal_folds_are_nearly_equal():
     values = np.random.default_rng(1).normal(0, 1, (200, 1))
-    folds = tuple((np.arange(200) % 5).tolist())
+    folds = Folds(tuple((np.arange(200) % 5).tolist()))
     apart, together = (
         np.ptp(Sample(values, told).interval[1:]) for told in (None, folds)
     )
     assert together == pytest.approx(apart, rel=0.5)
+
+
+def test_intervals_of_labs_contain_the_mean_of_all_labs_as_often_as_they_promise():
+    rng, tries = np.random.default_rng(2), 300
+    places = tuple(np.repeat(np.arange(5), 20).tolist())
+
+    def covered(folds: Folds, values: np.ndarray) -> bool:
+        _, low, high = Sample(values, folds).interval
+        return bool(low[0] <= 0 <= high[0])
+
+    labs, folds = Folds(places, are_labs=True), Folds(places)
+    found = []
+    for _ in range(tries):
+        of_lab, of_push = rng.normal(0, 1, 5), rng.normal(0, 0.5, 100)
+        values = (of_lab[list(places)] + of_push)[:, None]
+        found.append((covered(labs, values), covered(folds, values)))
+    promised, short = np.mean(found, axis=0)
+    assert 0.92 <= promised <= 0.98
+    assert short < 0.90
+
+
+def test_differences_between_models_in_labs_are_paired():
+    """All labs differ widely, and in each the second model errs more by the same."""
+    rng, places = np.random.default_rng(3), np.repeat(np.arange(5), 20)
+    one = rng.normal(0, 5, 5)[places] + rng.normal(0, 1, 100)
+    other = one + 0.5 + rng.normal(0, 0.1, 100)
+    labs = Folds(tuple(places.tolist()), are_labs=True)
+    value, low, high = Sample(other[:, None], labs).minus(Sample(one[:, None], labs))
+    assert low[0] < value[0] < high[0]
+    assert 0.4 < low[0] < high[0] < 0.6
+    assert np.ptp(Sample(one[:, None], labs).interval[1:]) > 5
+
+
+def test_one_lab_has_the_interval_of_its_pushes():
+    values = np.random.default_rng(4).normal(0, 1, (50, 1))
+    lab, plain = Folds((3,) * 50, are_labs=True), Sample(values).interval
+    found = Sample(values, lab).interval
+    np.testing.assert_allclose(np.ptp(found[1:]), np.ptp(plain[1:]), rtol=0.15)

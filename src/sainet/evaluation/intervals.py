@@ -6,7 +6,11 @@ for a bootstrap (95 % intervals of 5 runs would contain the true mean 84 times i
 those of 3 runs 75 times). Instead, each resample gets a draw of Student's t, times the
 standard error over runs, which gives the t interval where pushes are many. In a
 cross-validation, folds are resampled first, then the pushes in each fold: all pushes of
-a fold were predicted by the same network.
+a fold were predicted by the same network. Labs are resampled like folds, but are a few
+of very many, for which such intervals are too short (five labs: 84 in 100 again). The
+deviation of each resample is therefore multiplied, so that the interval of the mean of
+labs becomes the t interval; it stays the same for all models, so that differences are
+paired.
 """
 
 from dataclasses import dataclass
@@ -14,6 +18,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import norm, t
 
 RESAMPLES = 2000
 _SEED = 0
@@ -21,8 +26,24 @@ _ENDS = (2.5, 97.5)  # percentiles
 _FLOOR = 1e-12  # of a denominator
 
 Values = Float[np.ndarray, "... push quantity"]  # maybe an axis of training runs first
-Folds = tuple[int, ...]  # of each push
 Interval = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, low, high
+
+
+@dataclass(frozen=True)
+class Folds:
+    """The part that each push is in: a fold of a cross-validation, or a lab."""
+
+    of_push: tuple[int, ...]
+    are_labs: bool = False
+
+    @property
+    def widening(self) -> float:
+        """Factor of deviations that makes intervals of labs those of Student's t."""
+        count = len(set(self.of_push))
+        if not self.are_labs or count == 1:
+            return 1.0
+        high = _ENDS[1] / 100
+        return float(t.ppf(high, count - 1) / norm.ppf(high)) * (1 - 1 / count) ** -0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +52,7 @@ class Sample:
 
     Attributes:
         values: of each push and quantity, maybe with an axis of training runs first.
-        folds: of each push, in a cross-validation.
+        folds: or labs, of all pushes.
     """
 
     values: Values
@@ -107,15 +128,25 @@ def _shares(count: int) -> Float[np.ndarray, "sample count"]:
 @lru_cache(maxsize=4)
 def _shares_of_folds(folds: Folds) -> Float[np.ndarray, "sample push"]:
     """Return the shares of pushes, where folds are drawn first."""
-    owner = np.unique(folds, return_inverse=True)[1]
+    owner = np.unique(folds.of_push, return_inverse=True)[1]
     sizes = np.bincount(owner)
-    rng = np.random.default_rng((_SEED, len(folds), len(sizes)))
+    pushes = len(owner)
+    rng = np.random.default_rng((_SEED, pushes, len(sizes)))
     often = rng.multinomial(len(sizes), [1 / len(sizes)] * len(sizes), size=RESAMPLES)
-    shares = np.zeros((RESAMPLES, len(folds)))
+    shares = np.zeros((RESAMPLES, pushes))
     for fold, size in enumerate(sizes):
         drawn = rng.multinomial(often[:, fold] * size, [1 / size] * size)
         shares[:, owner == fold] = drawn
-    return shares / shares.sum(axis=1, keepdims=True)
+    shares /= shares.sum(axis=1, keepdims=True)
+    return shares if folds.widening == 1 else _widened(shares, folds.widening)
+
+
+def _widened(
+    shares: Float[np.ndarray, "sample push"], factor: float
+) -> Float[np.ndarray, "sample push"]:
+    """Return shares whose deviations from equal shares are multiplied."""
+    equal = 1 / shares.shape[1]
+    return equal + factor * (shares - equal)
 
 
 def _interval(

@@ -29,7 +29,7 @@ DIMENSIONS = {
     "travel_mm": ("sample", "body"),
     "decision_s": ("model", "sample", "decision"),
     "condition": ("sample",),
-    "fold": ("sample",),  # -1 where pushes are not cross-validated
+    "fold": ("sample",),  # or lab; -1 where neither
     "row": ("sample",),  # of the push in its dataset, or number of the trial
 }
 _COORDINATES = ("condition", "fold", "row")
@@ -98,6 +98,7 @@ class Header(msgspec.Struct, frozen=True, kw_only=True):
     # Published predictions are models, but have no training and no interval.
     predictions: tuple[str, ...] = ()  # their slugs
     provenance: Provenance = Provenance()
+    has_labs: bool = False  # `fold` numbers labs, not folds of a cross-validation
     format_version: int = FORMAT_VERSION
 
 

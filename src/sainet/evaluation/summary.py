@@ -162,7 +162,8 @@ class _Part:
         travel = measured.data["travel_mm"].values[part]
         self.bodies = int(np.isfinite(travel).any(axis=0).sum()) or travel.shape[1]
         self.travel_mm = travel[:, : self.bodies]
-        self.folds = _folds(measured.data["fold"].values[part])
+        folds = measured.data["fold"].values[part]
+        self.folds = folds_of(folds, are_labs=measured.header.has_labs)
         self.reference_m = measured.header.reference_m
         self.models = {
             slug: errors
@@ -275,8 +276,9 @@ def _trainings(errors: ModelErrors) -> int:
     return len(values) if values.ndim > 2 else 1  # noqa: PLR2004
 
 
-def _folds(folds: np.ndarray) -> Folds | None:
-    return tuple(folds.tolist()) if (folds >= 0).all() else None
+def folds_of(folds: np.ndarray, *, are_labs: bool) -> Folds | None:
+    """Return the folds or labs of samples, None if a sample is in none."""
+    return Folds(tuple(folds.tolist()), are_labs) if (folds >= 0).all() else None
 
 
 def _estimate(found: Interval, body: int, *, with_interval: bool = True) -> Estimate:
