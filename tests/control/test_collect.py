@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from importlib.util import find_spec
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -17,8 +19,12 @@ from sainet.control.collect import DATASET, SUMMARY, collect, push_file, summary
 from sainet.control.collected import read_push
 from sainet.control.config import CollectConfig
 from sainet.datasets.store import open_store
+from sainet.robots import make_robot
 from sainet.robots.simulated import SimulatedRobot
 from sainet.runs.errors import BadInput, BadSetting, RunConflict, SainetError
+from sainet.scenes.pushes import Push
+from sainet.scenes.state import at_rest
+from support import require
 
 CONFIG = CollectConfig(pushes=8, seed=5)
 DISTANCE = 0.054 + 0.059  # m, of centres of touching disks
@@ -224,3 +230,31 @@ def test_settings_out_of_range_are_refused(settings, says):
 def test_a_work_area_without_room_is_refused(tmp_path):
     with pytest.raises(BadInput, match="`area_mm` is 50.*larger"):
         collect(replace(CONFIG, area_mm=50.0), tmp_path / "out")
+
+
+def test_a_session_in_a_virtual_lab_resumes_to_the_same_bytes(tmp_path):
+    require(find_spec("mujoco"), "MuJoCo is not installed")
+    config = CollectConfig(robot="lab", lab=1, surface="plywood", pushes=4, seed=2)
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    store = collect(config, whole)
+    shutil.copytree(whole, part)
+    shutil.rmtree(part / DATASET)
+    for path in (part / SUMMARY, push_file(part, 2)):
+        path.unlink()
+    collect(config, part)
+    assert content(part) == content(whole)
+    assert store.info.groups == ("plywood-50",)
+    assert store.info.pushes == 4
+    for each in pushes_of(whole, 4):
+        # Disks and pusher have clocks of their own.
+        assert each.pose.count([[None] * 3] * 2) > 10 < each.pusher.count([None] * 2)
+
+
+def test_angles_of_a_virtual_lab_do_not_jump_at_half_a_turn():
+    require(find_spec("mujoco"), "MuJoCo is not installed")
+    robot = make_robot(CollectConfig(robot="lab"), 0)
+    robot.arrange(at_rest(robot.truth.position, jnp.full(2, np.pi), jnp.zeros(2)))
+    robot.observe()
+    push = Push(*(jnp.float32(x) for x in (0.5, 0.3, 0.01, 0.05)))
+    angle = robot.push(push).pose[..., 2]
+    assert np.ptp(angle[np.isfinite(angle).all(axis=1)], axis=0).max() < 0.3

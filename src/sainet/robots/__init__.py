@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 ROBOTS = {
     "simulated": "sainet.robots.simulated:simulated_robot",
-    "lab": "sainet.robots.lab.robot:lab_robot_of",
+    "lab": "sainet.robots.lab.robot:lab_robot",
     "abb": "sainet.robots.wire.abb:abb_robot",
 }
 Surface = Literal["abs", "plywood"]

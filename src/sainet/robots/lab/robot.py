@@ -1,18 +1,22 @@
 """The robot of a virtual lab, behind the interface of physical robots."""
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from sainet.robots import RobotConfig
 from sainet.robots.base import AbstractRobot
-from sainet.robots.lab.hidden import PUSHER_RADIUS, Lab
+from sainet.robots.lab.hidden import PUSHER_RADIUS, Lab, draw_lab
 from sainet.robots.lab.mechanics import TICK, Mechanics, Motion
 from sainet.scenes.pushes import Push, place_pusher, push_direction
 from sainet.scenes.recording import Conditions, Recording
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, at_rest
+from sainet.worlds.sampling import in_a_row
 
 CLEARANCE = 0.003  # m, between the pusher and disk 1 when it has descended
 _APPROACH = 0.03  # m/s
@@ -33,7 +37,9 @@ class LabRobot(AbstractRobot):
     the difference is one of the lab's hidden errors.
     """
 
-    def __init__(self, lab: Lab, state: State, *, seed: int = 0) -> None:
+    def __init__(
+        self, lab: Lab, state: State, *, seed: int | Sequence[int] = 0
+    ) -> None:
         """Put the disks on the table.
 
         Args:
@@ -46,7 +52,7 @@ class LabRobot(AbstractRobot):
         """
         self._lab = lab
         self._mechanics = Mechanics(lab)
-        self._rng = np.random.default_rng([_GENERATOR, lab.number, seed])
+        self._rng = _generator(lab, *np.atleast_1d(seed).tolist())
         self._pose = np.zeros((len(lab.disks), 3))  # in the robot's frame
         self.arrange(state)
 
@@ -81,6 +87,13 @@ class LabRobot(AbstractRobot):
                     exact = reach + rng.uniform(0, _LOOSE)
                     pose[i, :2] = pose[j, :2] + between * exact / distance
         self._pose = self._lab.capture.unseen(pose)
+
+    def resume(self, left: State | None, *seed: int) -> None:
+        """Put the disks back where a push left them, and draw noise anew."""
+        self._rng = _generator(self._lab, *seed)
+        if left is not None:
+            pose = np.concatenate([left.position, left.angle[..., None]], -1)
+            self._pose = self._lab.capture.unseen(pose.astype(np.float64))
 
     def observe(self) -> State:
         """Return the measured poses: the mean of a few frames."""
@@ -173,6 +186,18 @@ class LabRobot(AbstractRobot):
 def approach() -> Float[np.ndarray, " tick"]:
     """Return how far the pusher has come from its clearance (m); then it waits."""
     return np.minimum(_APPROACH * _ticks(CLEARANCE / _APPROACH + _WAIT), CLEARANCE)
+
+
+def lab_robot(config: RobotConfig, *seed: int) -> LabRobot:
+    """Return the robot of a virtual lab, its disks in a row."""
+    order = (1, 0) if config.swapped else (0, 1)
+    lab = draw_lab(config.lab, config.surface, order=order)
+    row = in_a_row(np.array([disk.radius for disk in lab.disks]))
+    return LabRobot(lab, row, seed=seed)
+
+
+def _generator(lab: Lab, *seed: int) -> np.random.Generator:
+    return np.random.default_rng([_GENERATOR, lab.number, *seed])
 
 
 def _ticks(duration: float) -> Float[np.ndarray, " tick"]:
