@@ -63,3 +63,14 @@ def test_one_lab_has_the_interval_of_its_pushes():
     lab, plain = Folds((3,) * 50, are_labs=True), Sample(values).interval
     found = Sample(values, lab).interval
     np.testing.assert_allclose(np.ptp(found[1:]), np.ptp(plain[1:]), rtol=0.15)
+
+
+def test_ratios_of_labs_are_positive_and_paired():
+    rng, places = np.random.default_rng(5), np.repeat(np.arange(2), 10)
+    one = np.exp(rng.normal(0, 0.5, 2)[places] + rng.normal(0, 0.3, 20))
+    labs = Folds(tuple(places.tolist()), are_labs=True)
+    twice = Sample(2 * one[:, None], labs).over(Sample(one[:, None], labs))
+    np.testing.assert_allclose(np.ravel(twice), 2, rtol=1e-9)
+    other = Sample(rng.uniform(1, 2, (20, 1)), labs)
+    value, low, high = Sample(one[:, None], labs).over(other)
+    assert 0 < low[0] < value[0] < high[0]

@@ -94,11 +94,11 @@ class Sample:
     @property
     def interval(self) -> Interval:
         """The means and the ends of their intervals."""
-        return _interval(self.mean, self.drawn())
+        return self._interval(self.mean, self.drawn())
 
     def minus(self, other: "Sample") -> Interval:
         """Return the differences of the means over the same pushes."""
-        return _interval(self.mean - other.mean, self.drawn() - other.drawn(1))
+        return self._interval(self.mean - other.mean, self.drawn() - other.drawn(1))
 
     def over(self, other: "Sample", *, trained_apart: bool = False) -> Interval:
         """Return the ratios of the means over the same pushes.
@@ -108,7 +108,23 @@ class Sample:
             trained_apart: the denominators are of another model.
         """
         drawn = self.drawn() / np.maximum(other.drawn(int(trained_apart)), _FLOOR)
-        return _interval(self.mean / np.maximum(other.mean, _FLOOR), drawn)
+        value = self.mean / np.maximum(other.mean, _FLOOR)
+        widening = self._widening
+        if widening != 1:  # of the logarithm: a ratio of few labs stays positive
+            drawn = value * (drawn / value) ** widening
+        return value, *np.percentile(drawn, _ENDS, axis=0)
+
+    @property
+    def _widening(self) -> float:
+        return 1.0 if self.folds is None else self.folds.widening
+
+    def _interval(
+        self, value: np.ndarray, drawn: Float[np.ndarray, "sample quantity"]
+    ) -> Interval:
+        if self._widening != 1:
+            drawn = value + self._widening * (drawn - value)
+        low, high = np.percentile(drawn, _ENDS, axis=0)
+        return value, low, high
 
 
 @lru_cache(maxsize=4)
@@ -137,20 +153,4 @@ def _shares_of_folds(folds: Folds) -> Float[np.ndarray, "sample push"]:
     for fold, size in enumerate(sizes):
         drawn = rng.multinomial(often[:, fold] * size, [1 / size] * size)
         shares[:, owner == fold] = drawn
-    shares /= shares.sum(axis=1, keepdims=True)
-    return shares if folds.widening == 1 else _widened(shares, folds.widening)
-
-
-def _widened(
-    shares: Float[np.ndarray, "sample push"], factor: float
-) -> Float[np.ndarray, "sample push"]:
-    """Return shares whose deviations from equal shares are multiplied."""
-    equal = 1 / shares.shape[1]
-    return equal + factor * (shares - equal)
-
-
-def _interval(
-    value: np.ndarray, drawn: Float[np.ndarray, "sample quantity"]
-) -> Interval:
-    low, high = np.percentile(drawn, _ENDS, axis=0)
-    return value, low, high
+    return shares / shares.sum(axis=1, keepdims=True)

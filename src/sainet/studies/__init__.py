@@ -27,6 +27,8 @@ STUDIES = {
     "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
     "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",
     "lab-realism": "sainet.studies.lab_realism:STUDY",
+    "lab-collect": "sainet.studies.lab_pushes:STUDY",
+    "lab-prediction": "sainet.studies.lab_prediction:STUDY",
 }
 
 

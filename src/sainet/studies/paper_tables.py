@@ -22,15 +22,17 @@ SEEDS = {"quick": range(1), "paper": range(5)}  # training runs of each network
 _PLANAR_SIZES = {"quick": (1000, 200, 500, 1), "paper": (4500, 500, 10_000, 3)}
 
 
-def _errors(
+def errors_of(
     model: ModelId,
     trans: tuple[float, ...],  # %
     pos: tuple[float, ...],  # mm
     rot: tuple[float, ...],  # deg
+    *,
+    condition: str = "",
 ) -> PublishedValues:
     """Return the published errors of one model, for each disk."""
     return PublishedValues(
-        condition="",
+        condition=condition,
         model=model,
         values={"trans_percent": trans, "pos_mm": pos, "rot_deg": rot},
     )
@@ -39,19 +41,19 @@ def _errors(
 # Of the paper (Ajay et al., ICRA 2019).
 _PHYSICS = physics()[0].id
 PUBLISHED_DIRECT_FORCE_TWO_DISKS = (
-    _errors(_PHYSICS, (2.82, 2.31), (6.57, 6.05), (0.91, 0.45)),
-    _errors(IN, (2.09, 1.47), (5.61, 3.79), (0.68, 0.26)),
-    _errors(SAIN, (1.62, 1.38), (4.38, 3.34), (0.38, 0.20)),
+    errors_of(_PHYSICS, (2.82, 2.31), (6.57, 6.05), (0.91, 0.45)),
+    errors_of(IN, (2.09, 1.47), (5.61, 3.79), (0.68, 0.26)),
+    errors_of(SAIN, (1.62, 1.38), (4.38, 3.34), (0.38, 0.20)),
 )
 PUBLISHED_DIRECT_FORCE_THREE_DISKS = (
-    _errors(_PHYSICS, (2.79, 2.34, 2.38), (6.53, 6.11, 6.21), (0.89, 0.48, 0.49)),
-    _errors(IN, (2.12, 1.63, 1.67), (5.68, 4.41, 4.52), (0.70, 0.34, 0.38)),
-    _errors(SAIN, (1.68, 1.52, 1.61), (4.54, 3.97, 4.34), (0.41, 0.25, 0.32)),
+    errors_of(_PHYSICS, (2.79, 2.34, 2.38), (6.53, 6.11, 6.21), (0.89, 0.48, 0.49)),
+    errors_of(IN, (2.12, 1.63, 1.67), (5.68, 4.41, 4.52), (0.70, 0.34, 0.38)),
+    errors_of(SAIN, (1.68, 1.52, 1.61), (4.54, 3.97, 4.34), (0.41, 0.25, 0.32)),
 )
 PUBLISHED_ROBOT_TWO_DISKS = (
-    _errors(_PHYSICS, (2.52, 2.19), (6.27, 5.81), (0.85, 0.29)),
-    _errors(IN, (2.13, 1.59), (5.76, 3.84), (0.72, 0.28)),
-    _errors(SAIN, (1.82, 1.50), (4.66, 3.47), (0.40, 0.21)),
+    errors_of(_PHYSICS, (2.52, 2.19), (6.27, 5.81), (0.85, 0.29)),
+    errors_of(IN, (2.13, 1.59), (5.76, 3.84), (0.72, 0.28)),
+    errors_of(SAIN, (1.82, 1.50), (4.66, 3.47), (0.40, 0.21)),
 )
 
 

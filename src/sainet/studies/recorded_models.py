@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
 # In identities: every training set has its own identified parameters.
-_IDENTIFIED = PlanarSpec(assumptions=Assumptions(table_friction=0.15, mass=(1.0,)))
+IDENTIFIED = PlanarSpec(assumptions=Assumptions(table_friction=0.15, mass=(1.0,)))
 _LONG_PUSHES = {"in": "in-stroke", "sain": "sain-stroke"}  # shipped networks
 
 
@@ -52,7 +52,7 @@ class Variant:
 
     def identity(self, variant: Made = "") -> ModelId:
         """Return the identity in tables."""
-        inside = SIMULATORS["planar"] if self.engine == "nominal" else _IDENTIFIED
+        inside = SIMULATORS["planar"] if self.engine == "nominal" else IDENTIFIED
         return ModelId(
             kind=self.network,
             simulator=None if self.network == "in" else inside,
@@ -95,7 +95,7 @@ class TunedModels:
         """Identify the engine on the same pushes."""
         self._scale: Scale = scale
         self._pushes = Given(training)
-        identity = ModelId(kind="physics", simulator=_IDENTIFIED)
+        identity = ModelId(kind="physics", simulator=IDENTIFIED)
         self.identified = Identify(identity, self._pushes)
 
     def physics(self) -> tuple[Step[Model], Step[Model]]:

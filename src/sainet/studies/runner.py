@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from sainet.learning.log import read_log
-from sainet.runs.workers import worker_lost
-from sainet.studies.steps import Step, Train
+from sainet.runs.workers import each_done, worker_lost
+from sainet.studies.steps import Apart, Step, Train
 
 _LOOK_AGAIN = 1.0  # s
 T = TypeVar("T")
@@ -96,9 +96,19 @@ class Runner:
         while order.is_active():
             ready = order.get_ready()
             self._train([s for k in ready if isinstance(s := steps[k], Train)])
+            self._work([s for k in ready if isinstance(s := steps[k], Apart)])
             for key in ready:
                 self._results[key] = steps[key].run(self)
             order.done(*ready)
+
+    def _work(self, steps: Sequence[Apart[Any]]) -> None:
+        """Do the work of several steps at once."""
+        if self.executor is None or steps == steps[:1]:
+            return
+        jobs = [(step, self.folder(step), index) for index, step in enumerate(steps)]
+        with self.bar(f"{steps[0].name} and {len(steps) - 1} more", len(steps)) as bar:
+            for _ in each_done(self.executor, _work_at, jobs):
+                bar.add(1)
 
     def _train(self, steps: Sequence[Train]) -> None:
         """Train several networks at once; finished ones and a single one need no pool.
@@ -141,3 +151,9 @@ class Runner:
                 total += lines[-1].iteration
                 losses.append(f"{lines[-1].loss:.3g}")
         return total, f"losses {', '.join(losses)}" if losses else ""
+
+
+def _work_at(step: Apart[Any], folder: Path, index: int) -> int:
+    """Do the work of a step (the job of a worker) and return its index."""
+    step.work(folder)
+    return index

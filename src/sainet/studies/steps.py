@@ -4,6 +4,7 @@ import abc
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from msgspec import structs
@@ -68,6 +69,15 @@ class Step(abc.ABC, Generic[T]):
         return "-".join([*words.split(), self.key])
 
 
+@dataclass(frozen=True, eq=False)
+class Apart(Step[T]):
+    """A step whose work other processes can do, each that of one such step."""
+
+    @abc.abstractmethod
+    def work(self, folder: Path) -> None:
+        """Do the work in the run folder, so that `run` finds it finished."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Given(Step[Store]):
     """Pushes that exist before the study begins."""
@@ -116,6 +126,19 @@ class First(Step[Store]):
     def run(self, runner: "Runner") -> Store:
         """Return the pushes."""
         return runner.result(self.pushes).first(self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Rest(Step[Store]):
+    """The pushes of a dataset after the first ones."""
+
+    pushes: Step[Store]
+    count: int
+
+    def run(self, runner: "Runner") -> Store:
+        """Return the pushes."""
+        store = runner.result(self.pushes)
+        return store.take(range(self.count, store.info.pushes))
 
 
 @dataclass(frozen=True, eq=False)
