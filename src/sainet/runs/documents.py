@@ -6,7 +6,7 @@ import json
 import os
 import stat
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -16,6 +16,7 @@ import msgspec
 from sainet.runs.errors import BadInput, shown
 
 LARGEST_DOCUMENT = 64 << 20  # bytes
+_LARGEST_TOML = 1 << 20  # bytes: written by people
 _LONGEST_REASON = 200  # characters of a message that quote a file
 T = TypeVar("T")
 
@@ -152,10 +153,37 @@ def read_document(
         BadInput: or the given subclass, in one line with file, field and remedy.
     """
     data = read_file(path, error=error)
-    advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
-    try:
+
+    def decode() -> T:
         _check_version(path, data, kind, error)
         return msgspec.json.decode(data, type=kind)
+
+    return _decoded(path, decode, error, remedy)
+
+
+def read_toml(path: Path, kind: type[T], *, remedy: str = "") -> T:
+    """Return a TOML file as a msgspec struct, with every field checked.
+
+    Args:
+        path: of the file.
+        kind: the struct.
+        remedy: what the user can do, without a full stop.
+
+    Raises:
+        BadInput: in one line with file, field and remedy.
+    """
+    data = read_file(path, most=_LARGEST_TOML)
+    return _decoded(
+        path, lambda: msgspec.toml.decode(data, type=kind), BadInput, remedy
+    )
+
+
+def _decoded(
+    path: Path, decode: Callable[[], T], error: type[BadInput], remedy: str
+) -> T:
+    advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
+    try:
+        return decode()
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
         raise error(f"{path}: {_reason(cause)}.{advice}") from None
 
