@@ -16,7 +16,6 @@ import msgspec
 from sainet.runs.errors import BadInput, shown
 
 LARGEST_DOCUMENT = 64 << 20  # bytes
-_LARGEST_TOML = 1 << 20  # bytes: written by people
 _LONGEST_REASON = 200  # characters of a message that quote a file
 T = TypeVar("T")
 
@@ -138,14 +137,20 @@ def _open_at_once(path: str, flags: int) -> int:
 
 
 def read_document(
-    path: Path, kind: type[T], *, error: type[BadInput] = BadInput, remedy: str = ""
+    path: Path,
+    kind: type[T],
+    *,
+    decode: Callable[..., T] = msgspec.json.decode,
+    error: type[BadInput] = BadInput,
+    remedy: str = "",
 ) -> T:
-    """Return a JSON document as a msgspec struct, with every field checked.
+    """Return a document as a msgspec struct, with every field checked.
 
     Args:
         path: of the file.
         kind: the struct. Where it has a field `format_version`, the default of that
-            field is the only version that is read.
+            field is the only version that is read (JSON).
+        decode: for another format than JSON, for example `msgspec.toml.decode`.
         error: to raise.
         remedy: what the user can do, without a full stop: "train it again".
 
@@ -153,37 +158,10 @@ def read_document(
         BadInput: or the given subclass, in one line with file, field and remedy.
     """
     data = read_file(path, error=error)
-
-    def decode() -> T:
-        _check_version(path, data, kind, error)
-        return msgspec.json.decode(data, type=kind)
-
-    return _decoded(path, decode, error, remedy)
-
-
-def read_toml(path: Path, kind: type[T], *, remedy: str = "") -> T:
-    """Return a TOML file as a msgspec struct, with every field checked.
-
-    Args:
-        path: of the file.
-        kind: the struct.
-        remedy: what the user can do, without a full stop.
-
-    Raises:
-        BadInput: in one line with file, field and remedy.
-    """
-    data = read_file(path, most=_LARGEST_TOML)
-    return _decoded(
-        path, lambda: msgspec.toml.decode(data, type=kind), BadInput, remedy
-    )
-
-
-def _decoded(
-    path: Path, decode: Callable[[], T], error: type[BadInput], remedy: str
-) -> T:
     advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
     try:
-        return decode()
+        _check_version(path, data, kind, error)
+        return decode(data, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
         raise error(f"{path}: {_reason(cause)}.{advice}") from None
 

@@ -45,7 +45,7 @@ FAULTS = {
     "limit of one side": ("[250.0, 750.0]", "[250.0]", "workspace.x_mm"),
     "limit NaN": ("[250.0, 750.0]", "[nan, 750.0]", "workspace.x_mm"),
     "speed missing": ("largest_speed_mm_s = 150.0\n", "", "motion.*largest_speed_mm_s"),
-    "speed in m/s": ("= 100.0\nhold", "= 0.05\nhold", "motion.travel_speed_mm_s"),
+    "speed in m/s": ("= 100.0\nhold", "= 0.1\nhold", "motion.travel_speed_mm_s"),
     "travel too fast": ("= 100.0\nhold", "= 160.0\nhold", "travel_speed_mm_s.*exceed"),
     "heights": ("push_height_mm = 6.0", "push_height_mm = 70.0", "push_height_mm"),
     "unit forgotten": ("mass_kg", "mass", "disks.*mass"),

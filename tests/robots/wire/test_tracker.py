@@ -13,10 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from robots.wire.emulated_tracker import FAULTS, EmulatedTracker, free_port, packet
 from sainet.robots.wire.cell import Cell, read_cell
+from sainet.robots.wire.clock import AbstractClock, SimulatedClock
 from sainet.robots.wire.disks import DiskTracker
 from sainet.robots.wire.frames import Rigid
 from sainet.robots.wire.motion_capture import MotionCapture
 from sainet.robots.wire.tracker import AbstractTracker, Frame
+from sainet.robots.wire.transport import UdpTransport
 from sainet.robots.wire.vicon import ViconStream, decode
 from sainet.runs.errors import BadInput
 from support import REPOSITORY
@@ -27,8 +29,8 @@ TABLE = np.array([[0.02, -0.03, 3.1], [0.13, -0.03, -0.5]])
 TO_TABLE = CELL.calibration.tracker_to_table
 
 
-def stream(port: int, now=time.monotonic) -> ViconStream:
-    return ViconStream(listen="127.0.0.1", port=port, host="127.0.0.1", now=now)
+def stream(port: int, clock: AbstractClock | None = None) -> ViconStream:
+    return ViconStream(UdpTransport(controller="127.0.0.1", port=port), clock)
 
 
 def emulated(port: int, poses=lambda: TABLE, **settings) -> EmulatedTracker:
@@ -45,6 +47,9 @@ class Listed(AbstractTracker):
     def frames(self) -> list[Frame]:
         found, self.waiting = self.waiting, []
         return found
+
+    def discard(self) -> None:
+        self.waiting = []
 
     def close(self) -> None:
         pass
@@ -110,7 +115,8 @@ def test_the_stream_listens_to_the_configured_address_only():
         assert tracker.frames() == []
         sender.bind(("127.0.0.2", 0))
         sender.sendto(mine, ("127.0.0.1", port))
-        assert tracker.frames() == []
+        (found,) = tracker.frames()
+        assert "another sender" in found.trouble and not found.bodies
     with (
         closing(stream(port)) as tracker,
         socket.socket(type=socket.SOCK_DGRAM) as sender,
@@ -123,7 +129,7 @@ def test_another_process_on_the_port_is_one_line():
     port = free_port()
     with (
         closing(stream(port)),
-        pytest.raises(BadInput, match=rf"port {port} .*choose") as error,
+        pytest.raises(BadInput, match=rf"port {port} of .*choose") as error,
     ):
         stream(port)
     assert "\n" not in str(error.value)
@@ -145,16 +151,16 @@ def test_measured_poses_are_those_of_the_table():
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_fault_has_its_reason_and_no_pose(fault):
-    port, clock = free_port(), SimpleNamespace(now=0.0)
+    port, clock = free_port(), SimulatedClock()
     sender = emulated(port, fault=fault, fault_at=10)
-    with closing(stream(port, lambda: clock.now)) as tracker:
+    with closing(stream(port, clock)) as tracker:
         disks = disks_of(tracker)
         reasons, first = [], None
         for tick in range(60):
-            clock.now = tick / 250
+            clock.advance_to(tick / 250)
             sender.tick()
             reasons += [m.trouble for m in disks.measure() if m.trouble]
-            reasons += [disks.silence(clock.now)]
+            reasons += [disks.silence(clock.now())]
             if first is None and any(reasons):
                 first = tick
     reason = next(filter(None, reasons))

@@ -13,16 +13,17 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.robots.wire.frames import Rigid, fit_rigid, residuals
-from sainet.runs.documents import read_toml
+from sainet.robots.wire.limits import FEEDBACK_AGE, LAG, LINE_LIMIT, SPEED_LIMIT, Limits
+from sainet.robots.wire.transport import LARGEST_PORT, LOOPBACK
+from sainet.runs.documents import read_document
 from sainet.scenes.quantities import FRICTION, MASS, PUSHER_RADIUS, RADIUS
 from sainet.scenes.scene import Scene
 
-LOOPBACK = "127.0.0.1"
 _FEWEST_POINTS = 4  # with three, an error in height leaves no residual
 _REMEDY = "compare with examples/cell.toml"
 
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
-Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
+Port = Annotated[int, msgspec.Meta(ge=1, le=LARGEST_PORT)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=1000)]
 Place = Annotated[float, msgspec.Meta(ge=-1e5, le=1e5)]  # mm
 Length = Annotated[float, msgspec.Meta(ge=0.01, le=1e4)]  # mm
@@ -103,11 +104,12 @@ class Pusher(_Section, frozen=True, kw_only=True):
 class Motion(_Section, frozen=True, kw_only=True):
     """Speeds of the pusher and limits of the motion."""
 
-    largest_speed_mm_s: Speed
-    travel_speed_mm_s: Speed
+    largest_speed_mm_s: Annotated[float, SPEED_LIMIT.times(1000, "mm/s").meta]
+    travel_speed_mm_s: Annotated[float, SPEED_LIMIT.times(1000, "mm/s").meta]
     hold_s: Seconds  # at the end of a push, until the disks rest
-    largest_deviation_mm: Length  # from the commanded path
-    largest_age_cycles: Annotated[int, msgspec.Meta(ge=1, le=100)]  # of feedback
+    largest_deviation_mm: Annotated[float, LINE_LIMIT.times(1000, "mm").meta]
+    largest_lag_s: Annotated[float, LAG.meta]  # of the arm behind its commands
+    largest_age_cycles: Annotated[float, FEEDBACK_AGE.meta]  # of feedback
 
     def __post_init__(self) -> None:
         """Check the order of the speeds."""
@@ -130,11 +132,6 @@ class Workspace(_Section, frozen=True, kw_only=True):
                 raise ValueError(
                     f"{name} is [{low:g}, {high:g}]; the lower limit comes first"
                 )
-
-    @property
-    def box(self) -> Float[np.ndarray, "2 3"]:
-        """Lower and upper limits (m)."""
-        return np.array([self.x_mm, self.y_mm, self.z_mm]).T / 1000
 
 
 class Point(_Section, frozen=True, kw_only=True):
@@ -215,6 +212,20 @@ class Cell(_Section, frozen=True, kw_only=True):
             raise ValueError("two disks have the same body")
 
     @property
+    def limits(self) -> Limits:
+        """The limits of the arm."""
+        place, motion = self.workspace, self.motion
+        low, high = zip(place.x_mm, place.y_mm, place.z_mm, strict=True)
+        return Limits(
+            low=_metres(low),
+            high=_metres(high),
+            speed=motion.largest_speed_mm_s / 1000,
+            line=motion.largest_deviation_mm / 1000,
+            lag=motion.largest_lag_s,
+            age=motion.largest_age_cycles,
+        )
+
+    @property
     def scene(self) -> Scene:
         """The measured properties of disks and pusher."""
         return Scene.disks(
@@ -227,10 +238,15 @@ class Cell(_Section, frozen=True, kw_only=True):
         )
 
 
+def _metres(place: Position) -> Position:
+    x, y, z = place
+    return x / 1000, y / 1000, z / 1000
+
+
 def read_cell(path: Path) -> Cell:
     """Return the checked configuration of a cell.
 
     Raises:
         BadInput: in one line with file, field and remedy.
     """
-    return read_toml(path, Cell, remedy=_REMEDY)
+    return read_document(path, Cell, decode=msgspec.toml.decode, remedy=_REMEDY)

@@ -64,7 +64,7 @@ class DiskTracker:
 
         Two disks may not have changed places, which is how exchanged names look.
         """
-        self._tracker.frames()
+        self._tracker.discard()
         self._paused, self._number, self._changed = True, None, None
 
     def forget(self) -> None:

@@ -1,14 +1,13 @@
 """Motion capture of several makers, by way of the package motioncapture."""
 
-import time
 from collections import deque
-from collections.abc import Callable
 from importlib import import_module
 from threading import Event, Thread
 from typing import Any
 
 import numpy as np
 
+from sainet.robots.wire.clock import AbstractClock, RealClock
 from sainet.robots.wire.frames import Rigid
 from sainet.robots.wire.tracker import AbstractTracker, Frame
 from sainet.runs.errors import MissingExtra
@@ -23,14 +22,14 @@ class MotionCapture(AbstractTracker):
     """
 
     def __init__(
-        self, system: str, host: str, now: Callable[[], float] = time.monotonic
+        self, system: str, host: str, clock: AbstractClock | None = None
     ) -> None:
         """Connect.
 
         Args:
             system: "vicon", "optitrack", "qualisys", "vrpn", ... or "mock".
             host: address of the system.
-            now: the clock (s).
+            clock: of the frames; by default the machine's monotonic clock.
 
         Raises:
             MissingExtra: the package is not installed.
@@ -42,7 +41,7 @@ class MotionCapture(AbstractTracker):
                 "Motion capture needs the package motioncapture: "
                 "pip install 'sainet[robot]'"
             ) from None
-        self._now, self._count = now, 0
+        self._clock, self._count = clock or RealClock(), 0
         self._waiting = deque[Frame](maxlen=_MOST_WAITING)
         self._ended = Event()
         Thread(target=self._listen, args=(package, system, host), daemon=True).start()
@@ -50,6 +49,10 @@ class MotionCapture(AbstractTracker):
     def frames(self) -> list[Frame]:
         """Return the frames that arrived since the last call, without waiting."""
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
+
+    def discard(self) -> None:
+        """Drop the frames that wait."""
+        self._waiting.clear()
 
     def close(self) -> None:
         """Stop listening, after the next frame."""
@@ -67,7 +70,7 @@ class MotionCapture(AbstractTracker):
 
     def _add(self, poses: dict[str, Rigid], trouble: str = "") -> None:
         self._count += 1
-        self._waiting.append(Frame(self._count, self._now(), poses, trouble))
+        self._waiting.append(Frame(self._count, self._clock.now(), poses, trouble))
 
 
 def _pose(body: Any) -> Rigid:  # noqa: ANN401 - a compiled type without stubs

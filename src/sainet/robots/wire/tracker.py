@@ -25,5 +25,9 @@ class AbstractTracker(ABC):
         """Return the frames that arrived since the last call, without waiting."""
 
     @abstractmethod
+    def discard(self) -> None:
+        """Drop the frames that wait."""
+
+    @abstractmethod
     def close(self) -> None:
         """Stop listening."""

@@ -5,23 +5,24 @@ item an identifier, the size of its data, a name, translations (mm) and Euler an
 XYZ (rad): the rotation is Rx Ry Rz. A packet has a fixed size; its rest is filled.
 """
 
-import socket
 import struct
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
 
+from sainet.robots.wire.clock import AbstractClock, RealClock
 from sainet.robots.wire.frames import Rigid
+from sainet.robots.wire.limits import Stopped
 from sainet.robots.wire.tracker import AbstractTracker, Frame
-from sainet.runs.errors import BadInput
+from sainet.robots.wire.transport import AbstractTransport
 
 _HEAD = struct.Struct("<IB")  # frame number, items
 _ITEM = struct.Struct("<BH")  # identifier, size of its data
 _POSE = struct.Struct("<24s6d")  # name, x y z (mm), angles about x, y, z (rad)
 _OBJECT = 0  # identifier of items with a pose
-_LARGEST = 1024  # bytes of a packet
+_MOST_AT_ONCE = 1000  # packets that wait
 
 
 def decode(packet: bytes, now: float) -> Frame:
@@ -74,49 +75,32 @@ class ViconStream(AbstractTracker):
     """Listens to Vicon's object stream."""
 
     def __init__(
-        self,
-        *,
-        listen: str,
-        port: int,
-        host: str,
-        now: Callable[[], float] = time.monotonic,
+        self, transport: AbstractTransport, clock: AbstractClock | None = None
     ) -> None:
-        """Listen.
+        """Take over the transport; closing the stream closes it.
 
         Args:
-            listen: address of this computer.
-            port: of this computer.
-            host: address of the tracker; packets of others are ignored.
-            now: the clock (s).
-
-        Raises:
-            BadInput: the address cannot be listened to.
+            transport: from the tracker.
+            clock: of the frames; by default the machine's monotonic clock.
         """
-        self._host, self._now = host, now
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        try:
-            self._socket.bind((listen, port))
-        except OSError as error:
-            self._socket.close()
-            raise BadInput(
-                f"tracker: cannot listen at {listen} port {port} ({error.strerror}); "
-                "end the process that does, or choose another port."
-            ) from None
+        self._transport, self._clock = transport, clock or RealClock()
 
     def frames(self) -> list[Frame]:
         """Return the frames that arrived since the last call, without waiting."""
-        return list(self._received())
+        received = iter(self._received, None)
+        return list(islice(received, _MOST_AT_ONCE))
 
-    def _received(self) -> Iterator[Frame]:
-        while True:
-            try:
-                packet, (host, *_) = self._socket.recvfrom(_LARGEST + 1)
-            except BlockingIOError:
-                return
-            if host == self._host:
-                yield decode(packet, self._now())
+    def _received(self) -> Frame | None:
+        try:
+            packet = self._transport.receive(0.0)
+        except Stopped as stopped:
+            return Frame(0, self._clock.now(), {}, str(stopped))
+        return None if packet is None else decode(packet, self._clock.now())
+
+    def discard(self) -> None:
+        """Drop the frames that wait."""
+        self._transport.discard()
 
     def close(self) -> None:
         """Stop listening."""
-        self._socket.close()
+        self._transport.close()
