@@ -155,6 +155,7 @@ def test_every_fault_has_its_reason_and_no_pose(fault):
     sender = emulated(port, fault=fault, fault_at=10)
     with closing(stream(port, clock)) as tracker:
         disks = disks_of(tracker)
+        disks.pause(0.0)
         reasons, first = [], None
         for tick in range(60):
             clock.advance_to(tick / 250)
@@ -207,7 +208,7 @@ def test_disks_may_move_while_nobody_measures_but_not_change_places():
     moved = TABLE + [0.05, 0, 0]
 
     def trouble(number, pose):
-        disks.pause()
+        disks.pause(0.0)
         tracker.waiting = [frame(number, pose)]
         return disks.measure()[0].trouble
 
@@ -215,7 +216,7 @@ def test_disks_may_move_while_nobody_measures_but_not_change_places():
     assert not trouble(2, moved)
     assert "exchanged" in trouble(3, moved[::-1])
     assert not trouble(1, moved)  # a tracker that started again counts anew
-    disks.forget()
+    disks.forget(0.0)
     assert not trouble(4, moved[::-1])
 
 

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 from jaxtyping import Float
@@ -28,8 +28,15 @@ class Stroke:
     trouble: str = ""  # why the motion was stopped or refused; empty: it was not
 
 
+def unwatched() -> str:
+    """Return no reason to stop a motion."""
+    return ""
+
+
 class AbstractArm(ABC):
     """An arm, which carries the pusher; positions are in its base frame."""
+
+    rehearsal: ClassVar[str] = ""  # why nothing moves; empty: the arm moves
 
     @abstractmethod
     def position(self) -> Float[np.ndarray, "3"]:
@@ -40,11 +47,17 @@ class AbstractArm(ABC):
         """
 
     @abstractmethod
-    def follow(self, path: Float[np.ndarray, "time 3"]) -> Stroke:
+    def follow(
+        self, path: Float[np.ndarray, "time 3"], watch: Callable[[], str] = unwatched
+    ) -> Stroke:
         """Follow positions (m), one for each cycle, and hold the last until it rests.
 
         A motion that is refused or stopped is a stroke with its reason; the arm then
         rests at the last commanded position.
+
+        Args:
+            path: positions.
+            watch: called in every cycle; a reason that it returns stops the motion.
         """
 
     def __enter__(self) -> "AbstractArm":
@@ -94,6 +107,8 @@ class Samples:
 class DryArm(AbstractArm):
     """Shows every command instead of sending one, and moves perfectly."""
 
+    rehearsal = "dry run: nothing was sent"
+
     def __init__(
         self,
         start: Float[np.ndarray, "3"],
@@ -116,7 +131,9 @@ class DryArm(AbstractArm):
         """Return where the arm would be (m)."""
         return self._position
 
-    def follow(self, path: Float[np.ndarray, "time 3"]) -> Stroke:
+    def follow(
+        self, path: Float[np.ndarray, "time 3"], watch: Callable[[], str] = unwatched
+    ) -> Stroke:
         """Show the positions of a path (m), if the limits allow it."""
         samples = Samples()
         try:

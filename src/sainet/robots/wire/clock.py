@@ -12,6 +12,10 @@ class AbstractClock(ABC):
     def now(self) -> float:
         """Return the time (s) since an arbitrary start."""
 
+    @abstractmethod
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+
 
 @final
 class RealClock(AbstractClock):
@@ -20,6 +24,10 @@ class RealClock(AbstractClock):
     def now(self) -> float:
         """Return the time (s) since an arbitrary start."""
         return time.monotonic()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        time.sleep(seconds)
 
 
 @final
@@ -33,6 +41,10 @@ class SimulatedClock(AbstractClock):
     def now(self) -> float:
         """Return the simulated time (s)."""
         return self._now
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        self.advance_to(self._now + seconds)
 
     def advance_to(self, moment: float) -> None:
         """Move the clock to a moment (s); an earlier moment changes nothing."""

@@ -7,11 +7,15 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.robots.wire.cell import Disk, Tracking
+from sainet.robots.wire.clock import AbstractClock
 from sainet.robots.wire.frames import Rigid
 from sainet.robots.wire.tracker import AbstractTracker, Frame
 
 _NOISE = 1e-3  # m: of two frames, far above that of motion capture
 _SAME_PLACE = 5e-3  # m: a disk that rested between two frames is closer
+REST = 2e-4  # m, between mean poses, that disks at rest may move
+
+Poses = Float[np.ndarray, "body 3"]  # m, m, rad, on the table
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class Measurement:
 
     number: int  # of the frame
     time: float  # s, on this computer's clock, when the frame was exposed
-    pose: Float[np.ndarray, "body 3"]  # m, m, rad; NaN with a trouble
+    pose: Poses  # NaN with a trouble
     trouble: str = ""
 
 
@@ -53,30 +57,31 @@ class DiskTracker:
         self._number: int | None = None  # of the newest frame
         self._raw = b""  # the poses of the last frame
         self._changed: float | None = None  # s, when they last changed
+        self._usable = -np.inf  # s, when the last usable frame was exposed
         self._paused = True  # nobody measured since `_last`
 
     def measure(self) -> list[Measurement]:
         """Return what was measured since the last call, without waiting."""
         return [self._measured(frame) for frame in self._tracker.frames()]
 
-    def pause(self) -> None:
+    def pause(self, now: float) -> None:
         """Drop the frames that wait; disks and tracker may have moved since the last.
 
         Two disks may not have changed places, which is how exchanged names look.
         """
         self._tracker.discard()
         self._paused, self._number, self._changed = True, None, None
+        self._usable = now
 
-    def forget(self) -> None:
+    def forget(self, now: float) -> None:
         """Pause; the disks may be anywhere now."""
-        self.pause()
+        self.pause(now)
         self._last = None
 
     def silence(self, now: float) -> str:
         """Return the trouble if the last usable frame is too old, else nothing."""
-        age = np.inf if self._last is None else now - self._last.time
-        most = self._limits.largest_age_s + self._limits.latency_s
-        if age <= most:
+        age = now - self._usable
+        if age <= self._limits.largest_age_s + self._limits.latency_s:
             return ""
         return f"the tracker gave no usable frame for {1000 * age:.0f} ms"
 
@@ -88,9 +93,10 @@ class DiskTracker:
             unknown = np.full((len(self._disks), 3), np.nan)
             return Measurement(frame.number, time, unknown, f"tracker: {reason}")
         self._last, self._paused = Measurement(frame.number, time, pose), False
+        self._usable = time
         return self._last
 
-    def _checked(self, frame: Frame) -> Float[np.ndarray, "body 3"]:
+    def _checked(self, frame: Frame) -> Poses:
         """Return the poses on the table, or raise `_Refused`."""
         if frame.trouble:
             raise _Refused(frame.trouble)
@@ -140,9 +146,7 @@ class DiskTracker:
                 f"'{disk.body}' is {off:+.1f} mm off its height above the table"
             )
 
-    def _continued(
-        self, frame: Frame, pose: Float[np.ndarray, "body 3"]
-    ) -> Float[np.ndarray, "body 3"]:
+    def _continued(self, frame: Frame, pose: Poses) -> Poses:
         """Return the poses with angles that continue the last ones, not wrapped."""
         if self._last is None:
             return pose
@@ -158,7 +162,7 @@ class DiskTracker:
             self._check_moved(pose, reach)
         return pose
 
-    def _check_names(self, pose: Float[np.ndarray, "body 3"], reach: float) -> None:
+    def _check_names(self, pose: Poses, reach: float) -> None:
         """Refuse disks that stand where others stood, and not where they stood."""
         assert self._last is not None
         offset = pose[:, None, :2] - self._last.pose[None, :, :2]
@@ -168,13 +172,59 @@ class DiskTracker:
                 names = f"'{self._disks[one].body}' and '{self._disks[other].body}'"
                 raise _Refused(f"the names {names} are exchanged")
 
-    def _check_moved(self, pose: Float[np.ndarray, "body 3"], reach: float) -> None:
+    def _check_moved(self, pose: Poses, reach: float) -> None:
         assert self._last is not None
-        step = pose - self._last.pose
-        for disk, (x, y, turn) in zip(self._disks, step, strict=True):
-            rim = abs(turn) * disk.radius_mm / 1000
-            moved = max(float(np.hypot(x, y)), float(rim))
-            if moved > reach:
+        steps = moved(self._disks, self._last.pose, pose)
+        for disk, step in zip(self._disks, steps, strict=True):
+            if step > reach:
                 raise _Refused(
-                    f"'{disk.body}' jumped {1000 * moved:.1f} mm between frames"
+                    f"'{disk.body}' jumped {1000 * step:.1f} mm between frames"
                 )
+
+
+def moved(
+    disks: Sequence[Disk], before: Poses, after: Poses
+) -> Float[np.ndarray, " body"]:
+    """Return how far disks moved (m), or their rims if those moved further."""
+    step = after - before
+    radius = np.array([disk.radius_mm for disk in disks]) / 1000
+    way = np.linalg.norm(step[:, :2], axis=-1)
+    return np.maximum(way, radius * np.abs(step[:, 2]))
+
+
+def unrest(disks: Sequence[Disk], poses: Float[np.ndarray, "time body 3"]) -> float:
+    """Return how far a disk moved (m) between the mean poses of both halves."""
+    half = max(len(poses) // 2, 1)
+    early, late = poses[:half].mean(axis=0), poses[-half:].mean(axis=0)
+    return float(moved(disks, early, late).max())
+
+
+class Watch:
+    """Measures the disks during a motion, and finds the reason to stop it."""
+
+    def __init__(
+        self, disks: DiskTracker, clock: AbstractClock, tolerated: int
+    ) -> None:
+        """Watch from the first call on.
+
+        Args:
+            disks: to measure.
+            clock: of the measurements.
+            tolerated: faulty frames in a row that do not stop the motion.
+        """
+        self._disks, self._clock, self._tolerated = disks, clock, tolerated
+        self._faulty: int | None = None
+        self.found: list[Measurement] = []  # usable ones
+
+    def __call__(self) -> str:
+        """Return why the motion has to stop, or nothing."""
+        if self._faulty is None:
+            self._disks.pause(self._clock.now())
+            self._faulty = 0
+        for measurement in self._disks.measure():
+            self._faulty = self._faulty + 1 if measurement.trouble else 0
+            if self._faulty > self._tolerated:
+                return measurement.trouble
+            if not measurement.trouble:
+                self.found.append(measurement)
+        return self._disks.silence(self._clock.now())

@@ -2,14 +2,14 @@
 
 import gc
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import final
 
 import numpy as np
 from jaxtyping import Float
 
-from sainet.robots.wire.arm import AbstractArm, NoFeedback, Samples, Stroke
+from sainet.robots.wire.arm import AbstractArm, NoFeedback, Samples, Stroke, unwatched
 from sainet.robots.wire.clock import AbstractClock, RealClock
 from sainet.robots.wire.egm import (
     Feedback,
@@ -86,8 +86,14 @@ class EgmArm(AbstractArm):
             "that the RAPID program runs and sends to this machine and port."
         )
 
-    def follow(self, path: Float[np.ndarray, "time 3"]) -> Stroke:
+    def follow(
+        self, path: Float[np.ndarray, "time 3"], watch: Callable[[], str] = unwatched
+    ) -> Stroke:
         """Follow positions (m), one for each cycle, and hold the last until it rests.
+
+        Args:
+            path: positions.
+            watch: called in every cycle; a reason that it returns stops the motion.
 
         Returns:
             The samples, with the reason if the motion was refused or stopped.
@@ -97,7 +103,9 @@ class EgmArm(AbstractArm):
             watchdog, rest = self._ready()
             rows = self._limits.rows(rest.position, path)
             with _undisturbed():
-                self._stream(rows, rest.orientation, watchdog, samples)
+                for _ in self._stream(rows, rest.orientation, watchdog, samples):
+                    if reason := watch():
+                        raise Stopped(reason)
         except Stopped as stopped:
             return samples.stroke(str(stopped))
         return samples.stroke()
@@ -140,8 +148,8 @@ class EgmArm(AbstractArm):
         orientation: Quaternion,
         watchdog: Watchdog,
         samples: Samples,
-    ) -> None:
-        """Answer each message with the next row."""
+    ) -> Iterator[None]:
+        """Answer each message with the next row; yield after each answer."""
         row, moved = -1, -np.inf
         while row + 1 < len(rows):
             feedback, now = self._next(watchdog)
@@ -152,6 +160,7 @@ class EgmArm(AbstractArm):
             self._answer(now, rows[row], orientation)
             watchdog.commanded(rows[row])
             samples.add(now, rows[row], feedback.position)
+            yield
 
     def _next(self, watchdog: Watchdog) -> tuple[Feedback, float]:
         """Return the newest feedback and its arrival; older ones are checked too."""
