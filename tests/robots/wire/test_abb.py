@@ -1,8 +1,13 @@
-"""The physical robot: its route, its recordings, and what stops it."""
+"""The physical robot: its route, its recordings, and what stops it.
 
-from collections.abc import Callable, Iterator
+EGM and Vicon's bytes travel to an emulated controller and from an emulated tracker, on
+a simulated clock; the planar engine moves the disks.
+"""
+
+import re
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import equinox as eqx
 import jax
@@ -11,20 +16,27 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from robots.wire.emulated_table import EmulatedTable, World
+from robots.wire.emulated_controller import EmulatedController, SimulatedLink
+from robots.wire.emulated_table import EmulatedTable
 from robots.wire.emulated_tracker import FAULTS, EmulatedTracker, free_port
 from sainet.datasets.recorded.resample import resample
+from sainet.engines import make_engine
+from sainet.engines.base import roll_out
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.outcomes import roll_pushes
 from sainet.robots.wire.abb import AbbRobot, NoPose
-from sainet.robots.wire.arm import AbstractArm, DryArm, Samples, Stroke, unwatched
+from sainet.robots.wire.arm import AbstractArm, DryArm
 from sainet.robots.wire.cell import Cell, read_cell
-from sainet.robots.wire.limits import CYCLE, Stopped
+from sainet.robots.wire.clock import SimulatedClock
+from sainet.robots.wire.guidance import EgmArm
+from sainet.robots.wire.limits import CYCLE
 from sainet.robots.wire.transport import UdpTransport
 from sainet.robots.wire.vicon import ViconStream
 from sainet.runs.errors import BadInput
+from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid
-from sainet.scenes.state import at_rest
+from sainet.scenes.recording import Recording
+from sainet.scenes.state import State, at_rest
 from support import REPOSITORY
 
 EXAMPLE: Cell = read_cell(REPOSITORY / "examples" / "cell.toml")
@@ -34,6 +46,8 @@ CELL: Cell = replace(
     motion=replace(EXAMPLE.motion, travel_speed_mm_s=150.0, hold_s=0.3),
 )
 TO_ROBOT = CELL.calibration.table_to_robot
+TO_TABLE = TO_ROBOT.inverse
+TO_TRACKER = CELL.calibration.tracker_to_table.inverse
 NAMES = [disk.body for disk in CELL.disks]
 TIP = (-0.13, 0.05)  # m, on the table, at the start
 APART = 2 * 0.0525
@@ -41,73 +55,81 @@ TABLE = np.array([[-0.05, 0.02, 2.0], [-0.05 + APART, 0.02, -1.0]])
 PUSH: Push = jax.tree.map(lambda x: x[33], PushGrid().pushes())
 
 
-class FollowingArm(AbstractArm):
-    """Follows exactly, on the clock of an emulated world."""
+class LinkedClock(SimulatedClock):
+    """A simulated clock; who waits lets the controller go on."""
 
-    def __init__(self, world: World) -> None:
-        self.world = world
-        self.tip = TO_ROBOT.moved(np.array([*TIP, 0.06]))
-        self.sent: list[np.ndarray] = []
-        self.closed = False
+    link: SimulatedLink
 
-    def position(self) -> np.ndarray:
-        return self.tip
-
-    def follow(self, path: np.ndarray, watch: Callable[[], str] = unwatched) -> Stroke:
-        samples = Samples()
-        try:
-            for row in CELL.limits.rows(self.tip, path):
-                self.world.wait(CYCLE)
-                self.world.table.move(row)
-                self.tip = row
-                self.sent.append(row)
-                samples.add(self.world.now(), row, row)
-                if reason := watch():
-                    raise Stopped(reason)
-        except Stopped as stopped:
-            return samples.stroke(str(stopped))
-        return samples.stroke()
-
-    def close(self) -> None:
-        self.closed = True
+    def wait(self, seconds: float) -> None:
+        self.link.idle(seconds)
 
 
 @dataclass
 class Loop:
-    """A robot over an emulated table."""
+    """A robot: emulated controller, table with disks, and tracker."""
 
     robot: AbbRobot
-    arm: AbstractArm
     table: EmulatedTable
     tracker: EmulatedTracker
-    world: World
-    asked: list[str] = field(default_factory=list)
+    controller: EmulatedController
+    clock: LinkedClock
+    asked: list[str]
+    lowest: float = np.inf  # m, of the tip above the table
+
+    def tick(self, tool: np.ndarray) -> None:
+        tip = TO_TABLE.moved(tool)
+        self.lowest = min(self.lowest, tip[2])
+        self.table.carry(tip)
+        self.tracker.tick()
+
+    @property
+    def sent(self) -> np.ndarray:
+        """Commanded positions (m)."""
+        return np.array([each.position for each in self.controller.answers])
+
+    def put(self, position: np.ndarray) -> None:
+        """Put the disks somewhere else."""
+        state, place = self.table.state, jnp.float32(position)
+        self.table._state = eqx.tree_at(lambda s: s.position, state, place)
 
 
 @contextmanager
 def loop(
     poses: np.ndarray = TABLE, cell: Cell = CELL, dry: list | None = None
 ) -> Iterator[Loop]:
-    port = free_port()
-    table = EmulatedTable(cell, poses)
-    height = cell.disks[0].height_mm / 1000
-    from_table = cell.calibration.tracker_to_table.inverse
-    names = NAMES
-    tracker = EmulatedTracker(names, lambda: table.poses, from_table, height, port)
-    world = World(table, tracker)
-    arm: AbstractArm = FollowingArm(world)
+    port, clock, asked = free_port(), LinkedClock(), []
+    disks = at_rest(jnp.float32(poses[:, :2]), jnp.float32(poses[:, 2]), jnp.zeros(2))
+    table = EmulatedTable(cell.scene, disks)
+    height, to_tracker = cell.disks[0].height_mm / 1000, TO_TRACKER
+    tracker = EmulatedTracker(NAMES, lambda: table.pose, to_tracker, height, port)
+    start = TO_ROBOT.moved(np.array([*TIP, 0.06]))
+    controller = EmulatedController(start)
+    clock.link = SimulatedLink(controller, clock)
+    arm: AbstractArm = EgmArm(clock.link, cell.limits, clock)
     if dry is not None:
-        arm = DryArm(arm.position(), cell.limits, lambda t, row: dry.append(row))
-    stream = ViconStream(UdpTransport(controller="127.0.0.1", port=port), world)
-    asked: list[str] = []
-    robot = AbbRobot(cell, arm, stream, ask=asked.append, clock=world)
+        arm = DryArm(start, cell.limits, lambda t, row: dry.append(row))
+    stream = ViconStream(UdpTransport(controller="127.0.0.1", port=port), clock)
+    robot = AbbRobot(cell, arm, stream, ask=asked.append, clock=clock)
+    made = Loop(robot, table, tracker, controller, clock, asked)
+    controller.carry = made.tick
     with robot, closing(tracker):
-        yield Loop(robot, arm, table, tracker, world, asked)
+        yield made
 
 
-def known(recording) -> tuple[np.ndarray, np.ndarray]:
+def known(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     rows = np.isfinite(recording.pose).all(axis=(1, 2))
     return recording.pose[rows], recording.pusher[np.isfinite(recording.pusher[:, 0])]
+
+
+def predicted(recording: Recording) -> State:
+    """The end of the engine's rollout with the recorded pusher."""
+    push = resample(recording)
+    start, turn = jnp.float32(push.initial[:, :2]), jnp.float32(push.initial[:, 2])
+    initial = at_rest(start, turn, jnp.float32(push.initial_pusher))
+    speed = np.diff(push.pusher, axis=0, prepend=push.initial_pusher[None]) * 240
+    path = PathControls(jnp.float32(push.pusher), jnp.float32(speed))
+    states = roll_out(make_engine("planar"), CELL.scene, initial, path).states
+    return jax.tree.map(lambda x: x[-1], states)
 
 
 def test_an_observation_is_the_mean_of_frames_at_rest():
@@ -122,15 +144,8 @@ def test_an_observation_is_the_mean_of_frames_at_rest():
 
 def test_moving_disks_are_not_observed():
     with loop() as made:
-        start = made.table.state.position
-
-        def creep() -> np.ndarray:
-            step = jnp.float32([[0.004 * made.world.now(), 0]])
-            state = eqx.tree_at(lambda s: s.position, made.table.state, start + step)
-            made.table.state = state
-            return made.table.poses
-
-        made.tracker.poses = creep
+        creep = np.array([0.004, 0, 0])  # m/s
+        made.tracker.poses = lambda: made.table.pose + creep * made.clock.now()
         with pytest.raises(NoPose, match="moves, by 0.4"):
             made.robot.observe()
 
@@ -139,22 +154,26 @@ def test_a_push_moves_the_disks_as_the_engine_predicts():
     with loop() as made:
         seen = made.robot.observe()
         recording = made.robot.push(PUSH)
-        batch = jax.tree.map(lambda x: jnp.asarray(x)[None], (CELL.scene, seen, PUSH))
-        wanted = roll_pushes(PhysicsDynamics(made.table.engine), *batch).final
         pose, pusher = known(recording)
         assert (recording.trouble, recording.commanded) == ("", PUSH)
         np.testing.assert_allclose(pose[0], TABLE, atol=2e-4)
-        np.testing.assert_allclose(pose[-1], made.table.poses, atol=2e-4)
-        # The pusher begins 5 mm off, and both rollouts have other time steps.
-        np.testing.assert_allclose(pose[-1, :, :2], wanted.position[0], atol=3e-4)
-        np.testing.assert_allclose(pose[-1, :, 2], wanted.angle[0], atol=0.01)
+        np.testing.assert_allclose(pose[-1], made.table.pose, atol=2e-4)
+        # Along the recorded path of the pusher, at the time step of models:
+        along = predicted(recording)
+        np.testing.assert_allclose(pose[-1, :, :2], along.position, atol=2e-4)
+        np.testing.assert_allclose(pose[-1, :, 2], along.angle, atol=0.01)
+        # A commanded pusher stops at once, and the disks slide on: 0.8 mm.
+        batch = jax.tree.map(lambda x: jnp.asarray(x)[None], (CELL.scene, seen, PUSH))
+        wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch).final
+        np.testing.assert_allclose(pose[-1, :, :2], wanted.position[0], atol=1e-3)
+        np.testing.assert_allclose(pose[-1, :, 2], wanted.angle[0], atol=0.02)
         way = np.linalg.norm(pusher[-1] - pusher[0])
         assert way == pytest.approx(0.010 + 0.005, abs=5e-4)
         speed = np.linalg.norm(np.diff(pusher, axis=0), axis=1) / CYCLE
-        np.testing.assert_allclose(speed[5:60], 0.05, rtol=1e-6)
-        tip = TO_ROBOT.inverse.moved(made.arm.position())
-        assert tip[2] == pytest.approx(CELL.pusher.travel_height_mm / 1000)
-        assert made.table.lowest == pytest.approx(CELL.pusher.push_height_mm / 1000)
+        np.testing.assert_allclose(speed[30:70], 0.05, rtol=0.02)
+        tip = TO_TABLE.moved(made.controller.place)
+        assert tip[2] == pytest.approx(CELL.pusher.travel_height_mm / 1000, abs=1e-4)
+        assert made.lowest == pytest.approx(CELL.pusher.push_height_mm / 1000, abs=1e-4)
 
 
 def test_a_recording_has_both_clocks_and_can_be_resampled():
@@ -176,7 +195,7 @@ def test_pushes_follow_each_other_and_the_arm_stays_inside_its_limits():
         for _ in range(3):
             made.robot.observe()
             assert not made.robot.push(PUSH).trouble
-        sent = np.array(made.arm.sent)
+        sent = made.sent
     limits = CELL.limits
     assert (sent >= limits.low).all() and (sent <= limits.high).all()
     assert np.linalg.norm(np.diff(sent, axis=0), axis=1).max() <= limits.step
@@ -187,13 +206,13 @@ def test_pushes_follow_each_other_and_the_arm_stays_inside_its_limits():
 def test_every_fault_of_the_tracker_stops_the_arm_with_its_reason(fault, during):
     with loop() as made:
         made.robot.observe()
-        before = len(made.arm.sent)
+        before = len(made.sent)
         made.tracker.fault = fault
         route = made.robot._route(made.robot.truth, PUSH)  # noqa: SLF001
         into = 100 if during == "approach" else len(route.approach) + 100
         made.tracker.fault_at = made.tracker.tick_count + into
         recording = made.robot.push(PUSH)
-        sent = np.array(made.arm.sent[before:])
+        sent = made.sent[before:]
     assert FAULTS[fault] in recording.trouble
     late = round(CELL.tracker.largest_age_s / CYCLE) + 30
     lead = CELL.limits.lag_cycles * (during == "push")
@@ -218,7 +237,7 @@ def test_a_stopped_push_is_recorded_as_far_as_it_was_commanded():
     assert 0 < length < float(PUSH.length)
     _, pusher = known(recording)
     way = np.linalg.norm(pusher[-1] - pusher[0])
-    assert way == pytest.approx(length + 0.005, abs=1e-3)
+    assert way == pytest.approx(length + 0.005, abs=2e-3)
     assert float(recording.commanded.speed) == float(PUSH.speed)
 
 
@@ -258,7 +277,7 @@ def test_a_push_outside_the_limits_is_refused_before_anything_moves(case):
     with loop(poses) as made:
         made.robot.observe()
         recording = made.robot.push(push)
-        assert made.arm.sent == []
+        assert not len(made.sent)
     assert reason in recording.trouble and "\n" not in recording.trouble
     assert recording.commanded is None
     np.testing.assert_allclose(recording.pose[0], poses, atol=1e-4)
@@ -267,13 +286,10 @@ def test_a_push_outside_the_limits_is_refused_before_anything_moves(case):
 def test_a_disk_that_was_moved_by_hand_is_not_pushed():
     with loop() as made:
         made.robot.observe()
-        moved = eqx.tree_at(
-            lambda s: s.position, made.table.state, jnp.float32(TABLE[:, :2] + 0.004)
-        )
-        made.table.state = moved
+        made.put(TABLE[:, :2] + 0.004)
         recording = made.robot.push(PUSH)
-        assert made.table.lowest == pytest.approx(CELL.pusher.push_height_mm / 1000)
-    assert "moved 5.7 mm before the push" in recording.trouble
+        assert made.lowest == pytest.approx(CELL.pusher.push_height_mm / 1000, abs=1e-4)
+    assert re.search(r"'disk-.' moved 5.\d mm before the push", recording.trouble)
 
 
 def test_disks_that_still_move_and_a_disk_that_does_not_are_reported():
@@ -293,7 +309,7 @@ def test_a_dry_run_shows_every_command_and_sends_none():
     with loop(dry=rows) as made:
         recording = made.robot.push(PUSH)
         route = made.robot._route(made.robot.truth, PUSH)  # noqa: SLF001
-        np.testing.assert_array_equal(made.table.poses, np.float32(TABLE))
+        np.testing.assert_array_equal(made.table.pose, np.float32(TABLE))
     assert recording.trouble == "dry run: nothing was sent"
     shown = np.array(rows)
     for row in (route.approach[-1], route.straight[len(route.straight) // 2]):
@@ -310,9 +326,7 @@ def test_people_are_asked_until_the_disks_are_in_place():
         def put(request: str) -> None:
             made.asked.append(request)
             off = [0.03, 0.002][min(len(made.asked), 2) - 1]
-            made.table.state = eqx.tree_at(
-                lambda s: s.position, made.table.state, goal.position + off
-            )
+            made.put(np.asarray(goal.position) + off)
 
         made.robot._ask = put  # noqa: SLF001
         made.robot.arrange(goal)
@@ -348,5 +362,5 @@ def test_a_tracker_that_names_no_such_body_lists_those_that_it_names():
 
 def test_the_robot_closes_its_connections():
     with loop() as made:
-        pass
-    assert made.arm.closed
+        port = made.tracker.port
+    UdpTransport(controller="127.0.0.1", port=port).close()
