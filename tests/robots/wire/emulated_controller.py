@@ -34,6 +34,9 @@ class Kind(Enum):
     STALL = "all messages from then on are delayed"
     REPEAT = "a message is sent twice"
     REORDER = "two messages change places"
+    OLD = "an old message arrives again"
+    BUNCH = "two messages are held up and arrive close together"
+    FLOOD = "messages arrive without a pause"
     BACKWARD = "the controller's clock goes backwards"
     TRUNCATE = "half of a message arrives"
     NOISE = "random bytes arrive"
@@ -60,7 +63,7 @@ class Fault(NamedTuple):
     @property
     def harmless(self) -> bool:
         """Whether a motion may go on: feedback that is late, but not too late."""
-        short = {Kind.HICCUP: 2, Kind.DELAY: 1}
+        short = {Kind.HICCUP: 2, Kind.DELAY: 1, Kind.BUNCH: math.inf}
         return self.size <= short.get(self.kind, 0)
 
 
@@ -70,13 +73,6 @@ class Answer(NamedTuple):
     time: float  # s
     position: tuple[float, float, float]  # m
     number: int
-
-
-class Used(NamedTuple):
-    """A command, as the controller used it in a cycle."""
-
-    cycle: int
-    position: tuple[float, float, float]  # m
 
 
 class Datagram(NamedTuple):
@@ -107,7 +103,7 @@ class EmulatedController:
 
     cycle: int = 0
     answers: list[Answer] = field(default_factory=list)
-    used: list[Used] = field(default_factory=list)
+    used: list[np.ndarray] = field(default_factory=list)  # m, target in each cycle
     places: list[np.ndarray] = field(default_factory=list)
     faulty: float = math.nan  # s, when the first faulty message was sent
     last_sent: float = math.nan  # s, when the last good message was sent
@@ -119,6 +115,7 @@ class EmulatedController:
         self._queue = [self.place] * self.dead
         self._reported = self.place
         self._held: bytes | None = None
+        self._before = b""
         self._faults = 0
         self._random = np.random.default_rng(self.seed)
 
@@ -200,7 +197,7 @@ class EmulatedController:
     def _move(self) -> None:
         stopped = self._on(Kind.MOTORS) or self._on(Kind.EGM) or self._on(Kind.RAPID)
         if self._target is not None and not stopped:
-            self.used.append(Used(self.cycle, tuple(self._target.tolist())))
+            self.used.append(self._target)
             self._queue.append(self._target)
             aim = self._queue.pop(0)
             share = 1 - math.exp(-CYCLE / self.lag)
@@ -215,31 +212,50 @@ class EmulatedController:
         """Return what is sent instead of a good message."""
         sent = [(0.0, good, False)]
         if not self._on():
+            self._before = good
             return sent
         self._faults += 1
         first, size = self._faults == 1, self.fault.size
+        sent = [(CYCLE * self._delay(), good, False)]
         match self.fault.kind:
-            case Kind.SILENCE:
+            case Kind.SILENCE | Kind.LOSE if self._gone(size):
                 sent = []
-            case Kind.LOSE if self._faults <= size:
-                sent = []
-            case Kind.DELAY if first:
-                sent = [(size * CYCLE, good, False)]
-            case Kind.STALL:
-                sent = [((size + 2.5) * CYCLE, good, False)]
             case Kind.REPEAT if first:
                 sent *= 1 + size
             case Kind.REORDER if first:
                 self._held, sent = good, []
             case Kind.REORDER if self._faults == 2:
                 sent.append((0.0, self._held or b"", False))
-            case Kind.TRUNCATE if first:
-                sent = [(0.0, good[: len(good) // 2], False)]
-            case Kind.NOISE if first:
-                sent = [(0.0, self._random.bytes(50 * size), False)]
+            case Kind.OLD if first:
+                sent.append((0.0, self._before, False))
+            case Kind.FLOOD if first:
+                for _ in range(120):
+                    self.sequence += 1
+                    sent.append((0.0, self.message(), False))
+            case Kind.TRUNCATE | Kind.NOISE if first:
+                sent = [(0.0, self._spoiled(good), False)]
             case Kind.STRANGER if first:
                 sent.insert(0, (0.0, good, True))
         return sent
+
+    def _delay(self) -> float:
+        """Return the delay of a message (cycles)."""
+        match self.fault.kind:
+            case Kind.DELAY if self._faults == 1:
+                return self.fault.size
+            case Kind.STALL:
+                return self.fault.size + 2.5
+            case Kind.BUNCH if self._faults <= 2:
+                return 0.95 * (3 - self._faults)
+        return 0.0
+
+    def _gone(self, size: int) -> bool:
+        return self.fault.kind is Kind.SILENCE or self._faults <= size
+
+    def _spoiled(self, good: bytes) -> bytes:
+        if self.fault.kind is Kind.TRUNCATE:
+            return good[: len(good) // 2]
+        return self._random.bytes(50 * self.fault.size)
 
 
 class SimulatedLink(AbstractTransport):

@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from robots.wire.emulated_controller import Answer, EmulatedController, Fault, Used
+from robots.wire.emulated_controller import Answer, EmulatedController, Fault
 from sainet.robots.wire.limits import CYCLE
 from sainet.robots.wire.transport import LOOPBACK
 
@@ -20,7 +20,7 @@ class Report(NamedTuple):
     """What a controller received and did since a fault was prepared."""
 
     answers: list[Answer]
-    used: list[Used]
+    used: list[np.ndarray]
     places: list[np.ndarray]
     faulty: float  # s
     last_sent: float  # s

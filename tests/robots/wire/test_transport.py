@@ -49,10 +49,18 @@ def test_another_sender_is_reported_and_not_answered(
         assert controller.recv(100) == b"command"
 
 
+def test_another_host_is_reported_although_it_is_first(transport: UdpTransport):
+    with sender("127.0.0.2") as stranger:
+        stranger.sendto(b"1", (LOOPBACK, transport.port))
+        with pytest.raises(Stopped, match="another sender, 127.0.0.2"):
+            transport.receive(1.0)
+
+
 def test_what_was_received_can_be_dropped(transport: UdpTransport):
     with sender() as first, sender() as second:
         for _ in range(5):
             first.sendto(b"old", (LOOPBACK, transport.port))
+        assert transport.receive(1.0) == b"old"
         transport.discard()
         second.sendto(b"new", (LOOPBACK, transport.port))
         assert transport.receive(1.0) == b"new"
