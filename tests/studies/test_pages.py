@@ -110,7 +110,9 @@ def test_measurements_of_a_study_are_kept_at_published_precision(tmp_path):
     (kept,) = (root / "results").iterdir()
     assert kept.name == "engine-parity.nc.xz"
     assert read_measurements(kept).to_bytes() == whole.to_bytes()
-    assert (root / "docs" / "figures" / ENGINE_ERRORS).read_text() == "<svg/>"
+    assert (
+        root / "docs" / "figures" / f"engine-parity-{ENGINE_ERRORS}"
+    ).read_text() == "<svg/>"
     with pytest.raises(BadInput, match="config.json"):
         keep(tmp_path / "no-study", root)
 

@@ -12,6 +12,7 @@ import msgspec
 MANIFEST = "manifest.json"
 _PACKAGES = (
     *("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr"),
+    "mujoco-core",
     "pybullet",
 )
 

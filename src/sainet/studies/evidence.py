@@ -104,7 +104,7 @@ def keep(path: Path, root: Path) -> None:
             measured.compact().write(results / f"{name}.nc.xz")
     if (path / ENGINE_ERRORS).is_file():
         figure = (path / ENGINE_ERRORS).read_bytes()
-        write_bytes(root / FIGURES / ENGINE_ERRORS, figure)
+        write_bytes(root / FIGURES / f"{study}-{ENGINE_ERRORS}", figure)
 
 
 def _cases(path: Path) -> dict[str, Benchmark]:

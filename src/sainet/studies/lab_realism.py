@@ -6,13 +6,15 @@ the unchanged planar engine on both are compared. Nothing is trained.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
-from sainet.evaluation.measurements import Condition
+from sainet.evaluation.joining import without_predictions
+from sainet.evaluation.measurements import Condition, Measurements
 from sainet.robots.lab.hidden import LABS, SURFACES, Lab, Surface, draw_lab
 from sainet.robots.lab.mechanics import TICK, Mechanics
 from sainet.robots.lab.robot import CLEARANCE, approach
@@ -21,6 +23,9 @@ from sainet.studies.recorded_models import surfaces_of
 from sainet.studies.recorded_pushes import EndErrors
 from sainet.studies.steps import Derive, Evaluate, Given, Join, Step
 from sainet.studies.study import RECORDED, Plan, Scope, Study
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 _GENERATOR = 0x4EA1
 _HOLD = 0.4  # s
@@ -77,6 +82,15 @@ def _repeat(lab: Lab, arrays: Arrays) -> Float[np.ndarray, "push 3"]:
     return lab.capture.measured(rng, motion.pose[:, -1, 0])
 
 
+@dataclass(frozen=True, eq=False)
+class _OfEngines(Join):
+    """Measurements without the model whose predictions came with recorded pushes."""
+
+    def run(self, runner: "Runner") -> Measurements:
+        """Return the measurements of all parts."""
+        return without_predictions(super().run(runner))
+
+
 def _plan(scope: Scope) -> Plan:
     """Return the engine's errors on recorded pushes and on those of each lab."""
     store = scope.recorded_pushes()
@@ -102,7 +116,7 @@ def _plan(scope: Scope) -> Plan:
             parts.append(Evaluate((engine,), pushes, condition))
         for name, pushes in list(cases.items())[: 1 + _DRAWN]:
             errors[f"{surface}, {name}"] = EndErrors(engine, pushes)
-    return Plan(Join(tuple(parts)), engine_errors=errors)
+    return Plan(_OfEngines(tuple(parts)), engine_errors=errors)
 
 
 STUDY = Study(
