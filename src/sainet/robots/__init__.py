@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 ROBOTS = {
     "simulated": "sainet.robots.simulated:simulated_robot",
     "lab": "sainet.robots.lab.robot:lab_robot",
-    "abb": "sainet.robots.wire.abb:abb_robot",
+    "abb": "sainet.robots.wire.connect:abb_robot",
 }
 Surface = Literal["abs", "plywood"]
 _MOST_LABS = 1_000_000

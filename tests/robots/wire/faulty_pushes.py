@@ -11,7 +11,7 @@ import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import jax.numpy as jnp
@@ -73,6 +73,10 @@ def table(start: np.ndarray) -> EmulatedTable:
     scene = Scene.disks([0.9], [0.0525])
     place = jnp.array([[start[0] + 0.06, start[1]]])
     return EmulatedTable(scene, at_rest(place, jnp.zeros(1), jnp.array([9.0, 9.0])))
+
+
+def disk_beneath(start: np.ndarray) -> Callable[[np.ndarray], None]:
+    return table(start).carry
 
 
 def straight(start: np.ndarray, end: np.ndarray, speed: float) -> np.ndarray:
@@ -229,8 +233,9 @@ def run_real(pushes: int, seed: int, *, disks: bool = False) -> Tally:
     kinds = [kind for kind in Kind if kind is not Kind.HICCUP]
     tally = Tally(real_time=True)
     transport = UdpTransport(controller=LOOPBACK, port=0)
+    beneath = disk_beneath if disks else None
     with (
-        RealController(HOME, transport.port, disks=disks) as controller,
+        RealController(HOME, transport.port, beneath=beneath) as controller,
         EgmArm(transport, LIMITS) as arm,
     ):
         for _ in range(pushes):

@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import socket
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import NamedTuple, Self
@@ -14,6 +15,9 @@ import numpy as np
 from robots.wire.emulated_controller import Answer, EmulatedController, Fault
 from sainet.robots.wire.limits import CYCLE
 from sainet.robots.wire.transport import LOOPBACK
+
+Carry = Callable[[np.ndarray], None]  # called every cycle with the tool, m
+Beneath = Callable[[np.ndarray], Carry]
 
 
 class Report(NamedTuple):
@@ -29,18 +33,20 @@ class Report(NamedTuple):
 class RealController:
     """A process that sends every cycle and receives answers."""
 
-    def __init__(self, start: np.ndarray, port: int, *, disks: bool = False) -> None:
+    def __init__(
+        self, start: np.ndarray, port: int, *, beneath: Beneath | None = None
+    ) -> None:
         """Start.
 
         Args:
             start: of the tool, m.
             port: to which it sends.
-            disks: whether it simulates a disk.
+            beneath: makes what the tool moves, in that process.
         """
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()
         self._process = context.Process(
-            target=serve, args=(start, port, disks, other), daemon=True
+            target=serve, args=(start, port, beneath, other), daemon=True
         )
         self._process.start()
         assert self._pipe.poll(60), "the emulated controller did not start"
@@ -65,13 +71,13 @@ class RealController:
         return self._pipe.recv()
 
 
-def serve(start: np.ndarray, port: int, disks: bool, pipe: Connection) -> None:
+def serve(
+    start: np.ndarray, port: int, beneath: Beneath | None, pipe: Connection
+) -> None:
     """Run a controller until it is asked to end."""
     controller = EmulatedController(start)
-    if disks:
-        from robots.wire.faulty_pushes import table
-
-        controller.carry = table(start).carry
+    if beneath is not None:
+        controller.carry = beneath(start)
         controller.carry(start)
     ours, strange = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
     with ours, strange:

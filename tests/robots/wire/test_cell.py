@@ -50,7 +50,7 @@ FAULTS = {
     "heights": ("push_height_mm = 6.0", "push_height_mm = 70.0", "push_height_mm"),
     "unit forgotten": ("mass_kg", "mass", "disks.*mass"),
     "grams": ("mass_kg = 0.837", "mass_kg = 837.0", r"disks.0..mass_kg"),
-    "unknown tracker": ('"vicon" ', '"vcon" ', "tracker.kind"),
+    "unknown tracker": ('"vicon-stream"', '"vcon"', "tracker.kind"),
     "one body twice": ('"disk-2"', '"disk-1"', "body"),
     "every address": ('listen = "127.0.0.1"', 'listen = "0.0.0.0"', "listen"),
     "no address": ('host = "127.0.0.1"', 'host = "robot"', "controller.*host"),

@@ -70,10 +70,6 @@ class AbbRobot(AbstractRobot):
         self._scene = cell.scene
         self._observed: State | None = None  # since the last push
 
-    def __enter__(self) -> "AbbRobot":
-        """Return this robot."""
-        return self
-
     def __exit__(
         self,
         kind: type[BaseException] | None,

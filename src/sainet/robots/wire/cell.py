@@ -66,9 +66,8 @@ class Controller(_Peer, frozen=True, kw_only=True):
 class Tracking(_Peer, frozen=True, kw_only=True):
     """The tracker, and what it may report."""
 
-    kind: Literal["vicon", "motioncapture"]
-    port: Port = 51001  # at which this computer listens (vicon)
-    system: str = ""  # of the package motioncapture: "vicon", "optitrack", ...
+    kind: Literal["vicon-stream", "vicon", "optitrack", "qualisys", "vrpn", "mock"]
+    port: Port = 51001  # at which this computer listens (vicon-stream)
     rate_hz: Rate  # frames per second
     latency_s: Seconds = 0.0  # from the exposure of a frame to its arrival
     largest_age_s: Seconds  # of the last usable frame while the robot moves

@@ -1,0 +1,151 @@
+"""Connecting to a cell over loopback, in real time, and what is refused before."""
+
+import io
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from robots.wire.emulated_table import EmulatedTable
+from robots.wire.emulated_tracker import EmulatedTracker, free_port
+from robots.wire.real_controller import RealController
+from sainet.robots import RobotConfig, make_robot
+from sainet.robots.wire.cell import Cell, read_cell
+from sainet.robots.wire.connect import ask_operator, connect
+from sainet.robots.wire.limits import CYCLE
+from sainet.robots.wire.transport import UdpTransport
+from sainet.runs.errors import BadInput, SainetError
+from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.state import at_rest
+from support import REPOSITORY
+
+EXAMPLE = REPOSITORY / "examples" / "cell.toml"
+TABLE = np.array([[-0.05, 0.02, 2.0], [0.055, 0.02, -1.0]])
+PUSH: Push = jax.tree.map(lambda x: x[33], PushGrid().pushes())
+EVERY = 4  # cycles, for each frame
+
+
+def example() -> Cell:
+    """The example at free ports, patient with a busy machine."""
+    made = read_cell(EXAMPLE)
+    tracker = replace(
+        made.tracker,
+        port=free_port(),
+        rate_hz=1 / (EVERY * CYCLE),
+        largest_age_s=1.0,
+        most_faulty_frames=5,
+    )
+    motion = replace(made.motion, hold_s=0.3, largest_age_cycles=25.0)
+    controller = replace(made.controller, port=free_port())
+    return replace(made, controller=controller, tracker=tracker, motion=motion)
+
+
+def disks_beneath(
+    cell: Cell, names: list[str], start: np.ndarray
+) -> Callable[[np.ndarray], None]:
+    """Disks and a tracker, in the process of the controller."""
+    place, angle = jnp.float32(TABLE[:, :2]), jnp.float32(TABLE[:, 2])
+    table = EmulatedTable(cell.scene, at_rest(place, angle, jnp.zeros(2)))
+    calibration, height = cell.calibration, cell.disks[0].height_mm / 1000
+    to_tracker = calibration.tracker_to_table.inverse
+    port = cell.tracker.port
+    tracker = EmulatedTracker(names, lambda: table.pose, to_tracker, height, port)
+    cycles = iter(range(10**9))
+
+    def carry(tool: np.ndarray) -> None:
+        table.carry(calibration.table_to_robot.inverse.moved(tool))
+        if next(cycles) % EVERY == 0:
+            tracker.tick()
+
+    for height in (0.0, 0.1):  # compiles
+        table.carry(np.array([-0.2, 0.2, height]))
+        assert np.isfinite(table.pose).all()
+    return carry
+
+
+@contextmanager
+def running(cell: Cell, names: list[str] | None = None) -> Iterator[RealController]:
+    names = names or [disk.body for disk in cell.disks]
+    start = cell.calibration.table_to_robot.moved(np.array([-0.13, 0.05, 0.06]))
+    beneath = partial(disks_beneath, cell, names)
+    with RealController(start, cell.controller.port, beneath=beneath) as controller:
+        yield controller
+
+
+@pytest.mark.slow
+def test_a_push_over_loopback_in_real_time():
+    cell = example()
+    with running(cell), connect(cell) as robot:
+        troubles = []
+        for _ in range(5):  # a busy machine is late at times, which stops a push
+            before = robot.observe()
+            recording = robot.push(PUSH)
+            troubles.append(recording.trouble)
+            if not recording.trouble:
+                break
+        after = robot.observe()
+    assert not troubles[-1], troubles
+    assert recording.commanded == PUSH
+    poses = recording.pose[np.isfinite(recording.pose).all(axis=(1, 2))]
+    start, end = np.asarray(before.position), np.asarray(after.position)
+    np.testing.assert_allclose(poses[0, :, :2], start, atol=2e-4)
+    np.testing.assert_allclose(poses[-1, :, :2], end, atol=2e-4)
+    assert np.linalg.norm(end - start, axis=1) == pytest.approx(0.0105, abs=2e-3)
+    assert len(poses) > 0.4 / (EVERY * CYCLE)
+
+
+@pytest.mark.slow
+def test_a_tracker_with_other_names_is_refused_before_anything_moves():
+    cell = example()
+    with running(cell, ["disk-1", "disc-2"]) as controller:
+        with pytest.raises(BadInput, match="'disk-2'.*Available: disc-2, disk-1"):
+            connect(cell)
+        assert controller.report().answers == []
+
+
+def written(tmp_path: Path, cell: Cell) -> Path:
+    """The example as a file, with the ports of a cell."""
+    text = EXAMPLE.read_text()
+    text = text.replace("port = 6510", f"port = {cell.controller.port}")
+    path = tmp_path / "cell.toml"
+    path.write_text(text.replace("port = 51001", f"port = {cell.tracker.port}"))
+    return path
+
+
+@pytest.mark.parametrize("device", ["tracker", "controller"])
+def test_another_process_on_a_port_is_one_line(tmp_path, device):
+    cell = example()
+    port = getattr(cell, device).port
+    other = UdpTransport(controller="127.0.0.1", port=port)
+    config = RobotConfig(robot="abb", config=written(tmp_path, cell))
+    with pytest.raises(BadInput, match=f"port {port}") as error:
+        make_robot(config, 0)
+    other.close()
+    assert "\n" not in str(error.value) and error.value.exit_status == 2
+    for each in (cell.tracker.port, cell.controller.port):  # nothing listens any more
+        UdpTransport(controller="127.0.0.1", port=each).close()
+
+
+def test_the_number_of_disks_is_that_of_the_cell(tmp_path):
+    text = EXAMPLE.read_text()
+    second = re.search(r"\[\[disks\]\]\nbody = \"disk-2\"\n(.*\n){3}", text)
+    assert second
+    path = tmp_path / "cell.toml"
+    path.write_text(text.replace(second[0], ""))
+    with pytest.raises(BadInput, match=r"cell.toml: it has 1 \[\[disks\]\], not 2"):
+        make_robot(RobotConfig(robot="abb", config=path), 0)
+
+
+def test_the_operator_confirms_on_the_terminal(monkeypatch, capsys):
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    ask_operator("Put the disks there.")
+    assert "Put the disks there. Then press Enter." in capsys.readouterr().err
+    with pytest.raises(SainetError, match="nobody is at the terminal"):
+        ask_operator("Put the disks there.")
