@@ -93,11 +93,11 @@ def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
 
 
 def test_a_page_states_every_claim_of_its_study():
-    pages = rendered(REPOSITORY)
     for name in STUDIES:
-        path = REPOSITORY / "docs" / "results" / f"{name}.md"
-        for claim in load_study(name).claims if path in pages else ():
-            assert f"Claim: {claim.text}. Verdict: " in pages[path], name
+        page = REPOSITORY / "docs" / "results" / f"{name}.md"
+        text = page.read_text("utf-8") if page.is_file() else ""
+        for claim in load_study(name).claims if text else ():
+            assert f"Claim: {claim.text}. Verdict: " in text, name
 
 
 def test_measurements_of_a_study_are_kept_at_published_precision(tmp_path):
