@@ -44,7 +44,8 @@ class ControlConfig(RobotConfig):
     """Maximum pushes per episode."""
     given_properties: GivenProperties = "true"
     """Masses and radii given to the network: true, or assumed (those of the internal
-    engine)."""
+    engine). The assumed properties of swapped disks follow them, unless assumed ones
+    are given: these stay in their order."""
     tolerance: float = 0.1
     """Success tolerance (fraction of target-disk radius)."""
     stopping_tolerance: float = 0.9
@@ -75,7 +76,7 @@ class ControlConfig(RobotConfig):
         require(late, "deadline", "positive and finite", self.deadline)
 
 
-_AREA_MM, _GAP_MM = (1.0, 10_000.0), (0.01, 100.0)
+_GAP_MM = (0.01, 100.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +89,6 @@ class CollectConfig(RobotConfig):
     """Random seed of pushes, places and, in simulation, of the noise."""
     repeats: int = 1
     """Number of times that each push is made, from the same arranged poses."""
-    area_mm: float = 300.0
-    """Side of the square around the table's origin that the centres of the disks stay
-    in (mm)."""
     gap_mm: float = 1.0
     """Largest gap or overlap of neighbouring disks that counts as touching (mm)."""
     planner: str | None = None
@@ -107,9 +105,9 @@ class CollectConfig(RobotConfig):
         for name in ("pushes", "repeats"):
             require_count(name, getattr(self, name), high=MOST_PUSHES)
         require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
-        for name, (low, high) in (("area_mm", _AREA_MM), ("gap_mm", _GAP_MM)):
-            value = getattr(self, name)
-            require(low <= value <= high, name, f"from {low:g} to {high:g}", value)
+        low, high = _GAP_MM
+        good = low <= self.gap_mm <= high
+        require(good, "gap_mm", f"from {low:g} to {high:g}", self.gap_mm)
         if self.planner is not None:
             require_one_of("planner", self.planner, PLANNERS)
         require_one_of("goals", self.goals, get_args(Goals))

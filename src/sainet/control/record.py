@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 import numpy as np
+from jaxtyping import Float
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import ControlStep, Episode
@@ -28,6 +29,9 @@ from sainet.scenes.state import State
 SUMMARY = "episodes.json"
 FOLDER = "episodes"
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
+
+_LEAST_MM = 1e-6  # length of a way
+_NO_NEARER = 10  # pushes
 
 # In mm and degrees. None: the simulation produced NaN or infinity.
 _Place = Finite | None
@@ -80,6 +84,30 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
     tolerance_mm: _Positive
     table_friction: Friction
     steps: list[StepRecord] = msgspec.field(name="turns")
+
+    @property
+    def overshoot_mm(self) -> float:
+        """The most that the target disk was beyond its goal, seen from its start."""
+        path = self._path
+        start = path[0]
+        way = np.array(self.goal_mm) - start
+        distance = max(float(np.linalg.norm(way)), _LEAST_MM)
+        beyond = (path - start) @ way / distance - distance
+        return float(np.nanmax(beyond, initial=0.0))
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether the last pushes came no nearer to the goal, which was not reached."""
+        away = np.linalg.norm(self._path - np.array(self.goal_mm), axis=1)
+        away[~np.isfinite(away)] = np.inf
+        return not self.solved and int(np.argmin(away)) + _NO_NEARER < len(away)
+
+    @property
+    def _path(self) -> Float[np.ndarray, "observation 2"]:
+        """Places of the target disk (mm) before each push, and at the end."""
+        poses = [step.observed for step in self.steps]
+        found = [each[self.moved][:2] for each in (*poses, self.final)]
+        return np.array(found, np.float64)
 
     def __post_init__(self) -> None:
         """Check lengths that depend on each other."""

@@ -10,10 +10,13 @@ from sainet.engines.simulator import PAPER
 from sainet.robots import make_robot
 from sainet.robots.base import AbstractRobot
 from sainet.robots.simulated import scene_of
+from sainet.scenes.pushes import push_axis
 from sainet.scenes.scene import Scene
 from sainet.tasks.goals import draw_goal
 from sainet.tasks.push_to_goal import PushToGoal
+from sainet.worlds.sampling import scattered
 
+_STARTS = 0x57A2
 _FRICTION = PAPER.table_friction or 0.0
 
 
@@ -28,14 +31,20 @@ class Trial(NamedTuple):
 def make_trial(config: ControlConfig, index: int) -> Trial:
     """Return the robot and the goal of one trial, equal for all models and planners."""
     robot = make_robot(config, config.seed, index)
-    true, state = robot.scene, robot.truth
+    true = robot.scene
+    if not config.starts_in_a_row:
+        rng = np.random.default_rng([_STARTS, config.seed, index])
+        side = config.area_mm / 1000
+        robot.arrange(scattered(rng, np.asarray(true.radius), side))
+        robot.observe()
+    state = robot.truth
     moved = config.disks - 1
     goal = draw_goal(
         config.goals,
         config.seed,
         index,
         disk=np.asarray(state.position)[moved],
-        axis=0.0,
+        axis=float(push_axis(state)),
         radius=float(true.radius[moved]),
     )
     task = PushToGoal(

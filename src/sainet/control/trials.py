@@ -76,20 +76,21 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
     trial, episode = make_trial(config, index), Episode()
     task = replace(trial.task, tolerance=config.stopping_tolerance * config.tolerance)
     path = episode_file(out, index)
-    try:
-        run_episode(
-            trial.robot,
-            planner,
-            model.dynamics,
-            task,
-            trial.scene,
-            pushes=config.pushes,
-            episode=episode,
-        )
-    except KeyboardInterrupt:
-        left = path.with_suffix(".interrupted.json")
-        write_document(left, record(config, index, trial, episode))
-        raise
+    with trial.robot as robot:
+        try:
+            run_episode(
+                robot,
+                planner,
+                model.dynamics,
+                task,
+                trial.scene,
+                pushes=config.pushes,
+                episode=episode,
+            )
+        except KeyboardInterrupt:
+            left = path.with_suffix(".interrupted.json")
+            write_document(left, record(config, index, trial, episode))
+            raise
     write_document(path, record(config, index, trial, episode))
     path.with_suffix(".interrupted.json").unlink(missing_ok=True)
     return index
@@ -101,7 +102,8 @@ def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     Raises:
         BadInput: model, planner or world is unknown, or the model is for other pushes.
     """
-    model = load_model(config.model)
+    follows = config.swapped and config.given_properties == "true"
+    model = load_model(config.model, order=(1, 0) if follows else None)
     model.check_fits("robot", TIME_STEP)
     planner = make_planner(config.planner, deadline=config.deadline)
     make_engine(config.world)
@@ -135,6 +137,8 @@ def measure_trials(
             [np.inf if e.final_mm is None else e.final_mm for e in part]
             for part in found
         ],
+        "overshoot_mm": [[each.overshoot_mm for each in part] for part in found],
+        "stuck": [[float(each.is_stuck) for each in part] for part in found],
     }
     numbers = np.arange(count, dtype=np.int32)
     places = {"condition": 0 * numbers, "fold": 0 * numbers - 1, "row": numbers}

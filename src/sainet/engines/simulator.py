@@ -5,7 +5,7 @@ two equal specifications make the same prediction. `build` returns the engine. F
 JAX until then.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar
 
@@ -36,6 +36,16 @@ class Assumptions(msgspec.Struct, frozen=True, kw_only=True):
     table_friction: Friction | None = None  # between disks and table
     disk_friction: Friction | None = None  # between disks
     pusher_friction: Friction | None = None  # between pusher and disk
+
+    def in_order(self, order: Sequence[int]) -> "Assumptions":
+        """Return the properties of the same disks in another order.
+
+        Args:
+            order: which of the listed disks is disk 1, disk 2 and so on.
+        """
+        mass = self.mass and tuple(self.mass[disk] for disk in order)
+        radius = self.radius and tuple(self.radius[disk] for disk in order)
+        return msgspec.structs.replace(self, mass=mass, radius=radius)
 
 
 # The paper's properties (section IV-B), and the same with true masses and radii.

@@ -14,7 +14,7 @@ def to_json_object(summary: Summary) -> Json:
     """Return rows, comparisons and published rows as JSON values."""
     if summary.is_of_trials:
         worlds = {c.label: c.factors.get("world") for c in summary.conditions}
-        return {
+        found: Json = {
             "rows": [_of_world(row, worlds) for row in summary.trials],
             "pairs": [_of_world(test, worlds) for test in summary.tests],
             "published": [
@@ -27,6 +27,10 @@ def to_json_object(summary: Summary) -> Json:
                 for each in summary.published
             ],
         }
+        if summary.outcomes:
+            found["outcomes"] = msgspec.to_builtins(summary.outcomes)
+            found["differences"] = msgspec.to_builtins(summary.differences)
+        return found
     return {
         "rows": [_row(row) for row in summary.rows],
         "published": [

@@ -13,9 +13,11 @@ labs becomes the t interval; it stays the same for all models, so that differenc
 paired.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
+import msgspec
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import norm, t
@@ -154,3 +156,27 @@ def _shares_of_folds(folds: Folds) -> Float[np.ndarray, "sample push"]:
         drawn = rng.multinomial(often[:, fold] * size, [1 / size] * size)
         shares[:, owner == fold] = drawn
     return shares / shares.sum(axis=1, keepdims=True)
+
+
+class Estimate(msgspec.Struct, frozen=True):
+    """A number with the ends of its 95 % interval; None where it is unknown."""
+
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+
+
+def estimate(found: Interval, body: int, *, with_interval: bool = True) -> Estimate:
+    """Return one of several numbers with its interval."""
+    value, low, high = (_number(float(part[body])) for part in found)
+    return Estimate(value, low, high) if with_interval else Estimate(value)
+
+
+def _number(value: float) -> float | None:
+    """Return a number that JSON can hold; None where it is unknown."""
+    return float(value) if math.isfinite(value) else None
+
+
+def folds_of(folds: np.ndarray, *, are_labs: bool) -> Folds | None:
+    """Return the folds or labs of samples, None if a sample is in none."""
+    return Folds(tuple(folds.tolist()), are_labs) if (folds >= 0).all() else None

@@ -23,9 +23,10 @@ from sainet.runs.manifest import Manifest, manifest
 
 FORMAT_VERSION = 1
 PUSHES, TRIALS = ("model", "training", "sample", "body"), ("model", "sample")
+_OF_TRIALS = ("solved", "ended", "pushes", "final_mm", "overshoot_mm", "stuck")
 DIMENSIONS = {
     **dict.fromkeys(("pos_mm", "rot_deg", "final_pos_mm", "final_rot_deg"), PUSHES),
-    **dict.fromkeys(("solved", "ended", "pushes", "final_mm"), TRIALS),
+    **dict.fromkeys(_OF_TRIALS, TRIALS),
     "travel_mm": ("sample", "body"),
     "decision_s": ("model", "sample", "decision"),
     "condition": ("sample",),

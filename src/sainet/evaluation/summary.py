@@ -1,13 +1,12 @@
 """Summaries: means with intervals by condition, model and body; and comparisons."""
 
-import math
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 
 import msgspec
 import numpy as np
 
-from sainet.evaluation.intervals import Folds, Interval, Sample
+from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import (
     Condition,
     Measurements,
@@ -15,16 +14,17 @@ from sainet.evaluation.measurements import (
     PublishedValues,
 )
 from sainet.evaluation.metrics import MEASURED, METRICS, ModelErrors
-from sainet.evaluation.trials import TrialRow, TrialTest, compare_trials, trial_rows
+from sainet.evaluation.trials import (
+    TrialDifference,
+    TrialOutcome,
+    TrialRow,
+    TrialTest,
+    compare_trials,
+    trial_differences,
+    trial_outcomes,
+    trial_rows,
+)
 from sainet.models.identity import ModelId
-
-
-class Estimate(msgspec.Struct, frozen=True):
-    """A number with the ends of its 95 % interval; None where it is unknown."""
-
-    value: float | None = None
-    low: float | None = None
-    high: float | None = None
 
 
 class Row(msgspec.Struct, frozen=True, kw_only=True):
@@ -72,6 +72,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     factors: tuple[Factor, ...] = ()
     trials: tuple[TrialRow, ...] = ()
     tests: tuple[TrialTest, ...] = ()
+    outcomes: tuple[TrialOutcome, ...] = ()  # of trials in labs
+    differences: tuple[TrialDifference, ...] = ()
     published: tuple[PublishedValues, ...] = ()
     provenance: Provenance = Provenance()
 
@@ -112,7 +114,11 @@ def summarise(measured: Measurements, *, subject: str = "") -> Summary:
     )
     if measured.is_of_trials:
         return msgspec.structs.replace(
-            found, trials=trial_rows(measured), tests=compare_trials(measured)
+            found,
+            trials=trial_rows(measured),
+            tests=compare_trials(measured),
+            outcomes=tuple(trial_outcomes(measured)),
+            differences=tuple(trial_differences(measured)),
         )
     rows: list[Row] = []
     predictions: list[Row] = []
@@ -212,7 +218,7 @@ class _Part:
                 count=len(self.travel_mm),
                 trainings=_trainings(errors),
                 values={
-                    key: _estimate(each, body, with_interval=with_intervals)
+                    key: estimate(each, body, with_interval=with_intervals)
                     for key, each in found.items()
                 },
             )
@@ -233,7 +239,7 @@ class _Part:
                     against=against,
                     body=body + 1,
                     metric=metric,
-                    difference=_estimate(found, body),
+                    difference=estimate(found, body),
                 )
 
     def factors(self) -> Iterator[Factor]:
@@ -253,8 +259,8 @@ class _Part:
                 metric=metric,
                 error=float(below.values.mean()),
                 baseline=float(above.values.mean()),
-                factor=_estimate(above.over(below, trained_apart=True), 0),
-                difference=_estimate(below.minus(above), 0),
+                factor=estimate(above.over(below, trained_apart=True), 0),
+                difference=estimate(below.minus(above), 0),
             )
 
     def _over_bodies(self, errors: ModelErrors, metric: str) -> Sample:
@@ -274,18 +280,3 @@ class _Part:
 def _trainings(errors: ModelErrors) -> int:
     values = next(iter(errors.errors.values()))
     return len(values) if values.ndim > 2 else 1  # noqa: PLR2004
-
-
-def folds_of(folds: np.ndarray, *, are_labs: bool) -> Folds | None:
-    """Return the folds or labs of samples, None if a sample is in none."""
-    return Folds(tuple(folds.tolist()), are_labs) if (folds >= 0).all() else None
-
-
-def _estimate(found: Interval, body: int, *, with_interval: bool = True) -> Estimate:
-    value, low, high = (_number(float(part[body])) for part in found)
-    return Estimate(value, low, high) if with_interval else Estimate(value)
-
-
-def _number(value: float) -> float | None:
-    """Return a number that JSON can hold; None where it is unknown."""
-    return float(value) if math.isfinite(value) else None

@@ -1,6 +1,6 @@
 """Models by name: physics, a shipped network, or the folder of a trained one."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -138,7 +138,13 @@ def _pushes_of(engine: str) -> str:
     return "recorded pushes" if is_recorded else f"pushes simulated by {engine}"
 
 
-def load_model(name: str, *, engine: str | None = None, force: bool = False) -> Model:
+def load_model(
+    name: str,
+    *,
+    engine: str | None = None,
+    force: bool = False,
+    order: Sequence[int] | None = None,
+) -> Model:
     """Return a model by its name.
 
     Args:
@@ -149,6 +155,8 @@ def load_model(name: str, *, engine: str | None = None, force: bool = False) -> 
         engine: inside the model; None is planar for physics, and for a network the
             one that it was trained around.
         force: put a network around another engine all the same.
+        order: of the disks whose masses and radii the internal engine assumes; None:
+            as they are listed.
 
     Raises:
         UnknownName: neither a model nor a folder has this name, or no engine.
@@ -158,15 +166,16 @@ def load_model(name: str, *, engine: str | None = None, force: bool = False) -> 
         MissingExtra: the engine needs a package that is not installed.
     """
     if name in PHYSICS:
-        return _physics(name, engine or "planar")
+        return _physics(name, engine or "planar", order)
     folder = network_folder(name)
     if is_identified(folder):
-        return _identified_physics(folder, engine)
+        return _identified_physics(folder, engine, order)
     network, card = load_network(folder)
     dynamics: AbstractDynamics = LearnedDynamics(network)
     internal = None
     if card.identity.simulator is not None:
         simulator = _internal(folder, card, card.identity.simulator, engine, force)
+        simulator = _ordered(simulator, order)
         internal = InternalEngine(simulator, card.camera)
         dynamics = SimulatorAugmented(network, simulator.build())
     if card.has_single_steps:
@@ -199,14 +208,25 @@ def physics_simulator(name: str, engine: str) -> SimulatorSpec:
     return known[engine]
 
 
-def _physics(name: str, engine: str) -> Model:
+def _ordered(simulator: SimulatorSpec, order: Sequence[int] | None) -> SimulatorSpec:
+    """Return the simulator with its assumed properties in another order of disks."""
+    if order is None:
+        return simulator
+    assumptions = simulator.assumptions.in_order(order)
+    return msgspec.structs.replace(simulator, assumptions=assumptions)
+
+
+def _physics(name: str, engine: str, order: Sequence[int] | None) -> Model:
     simulator = physics_simulator(name, engine)
     identity = ModelId(kind="physics", simulator=simulator)
+    simulator = _ordered(simulator, order)
     internal = InternalEngine(simulator)
     return Model(identity, PhysicsDynamics(simulator.build()), internal=internal)
 
 
-def _identified_physics(folder: Path, engine: str | None) -> Model:
+def _identified_physics(
+    folder: Path, engine: str | None, order: Sequence[int] | None
+) -> Model:
     if engine not in (None, PlanarSpec.engine):
         raise BadInput(
             f"{folder / IDENTIFIED}: its parameters are those of the planar engine, "
@@ -214,6 +234,8 @@ def _identified_physics(folder: Path, engine: str | None) -> Model:
         )
     internal = read_identified(folder).engine
     identity = ModelId(kind="physics", simulator=internal.simulator)
+    simulator = _ordered(internal.simulator, order)
+    internal = msgspec.structs.replace(internal, simulator=simulator)
     physics = PhysicsDynamics(internal.simulator.build())
     digest = content_hash(read_file(folder / IDENTIFIED))
     dynamics = with_camera(physics, internal.camera)

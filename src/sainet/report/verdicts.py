@@ -120,6 +120,13 @@ def trial_sentences(summary: Summary) -> Iterator[str]:
             f"only {labels[test.against]} {test.only_other} "
             f"(exact McNemar p = {test.p:.2g})"
         )
+    for each in summary.differences:
+        found = each.difference
+        yield (
+            f"{each.condition}, {each.measure.replace('_', ' ')}: "
+            f"{labels[each.model]} minus {labels[each.against]} {_signed(found.value)} "
+            f"[{_signed(found.low)}, {_signed(found.high)}]"
+        )
 
 
 def _is_reported(test: TrialTest) -> bool:

@@ -21,6 +21,7 @@ ROBOTS = {
 Surface = Literal["abs", "plywood"]
 _MOST_LABS = 1_000_000
 _PHYSICAL = "abb"
+_AREA_MM = (1.0, 10_000.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +43,9 @@ class RobotConfig:
     """Surface of the virtual lab: abs or plywood."""
     swapped: bool = False
     """Exchange the two disks of the virtual lab, so that the larger one is pushed."""
+    area_mm: float = 300.0
+    """Side of the square around the table's origin that disks are arranged in, with
+    their centres (mm; lab and abb)."""
     config: Path | None = None
     """Configuration of the cell of the physical robot (TOML). Default: none."""
 
@@ -54,6 +58,9 @@ class RobotConfig:
         require_count("lab", self.lab, low=0, high=_MOST_LABS)
         two = self.robot == "simulated" or self.disks == 2  # noqa: PLR2004
         require(two, "disks", "2 unless `robot` is simulated", self.disks)
+        low, high = _AREA_MM
+        wanted = f"from {low:g} to {high:g}"
+        require(low <= self.area_mm <= high, "area_mm", wanted, self.area_mm)
         known = self.is_physical == (self.config is not None)
         wanted = f"the file of a cell if `robot` is {_PHYSICAL}, and left out otherwise"
         require(known, "config", wanted, self.config)
@@ -64,6 +71,11 @@ class RobotConfig:
     def is_physical(self) -> bool:
         """Whether the robot exists: it cannot be made twice, nor be set back."""
         return self.robot == _PHYSICAL
+
+    @property
+    def starts_in_a_row(self) -> bool:
+        """Whether trials start with disks along the x axis, not anywhere."""
+        return self.robot == "simulated"
 
     def settings(self) -> Mapping[str, object]:
         """Return every setting as a JSON value, for run folders."""

@@ -29,6 +29,9 @@ STUDIES = {
     "lab-realism": "sainet.studies.lab_realism:STUDY",
     "lab-collect": "sainet.studies.lab_pushes:STUDY",
     "lab-prediction": "sainet.studies.lab_prediction:STUDY",
+    "lab-control": "sainet.studies.lab_control:CONTROL",
+    "lab-new-surface": "sainet.studies.lab_control:NEW_SURFACE",
+    "lab-swapped-disks": "sainet.studies.lab_control:SWAPPED_DISKS",
 }
 
 

@@ -171,10 +171,9 @@ def errs_at_most(
         ]
         if not one or len(one) != len(other):
             return Verdict("not testable here")
-        wrong = tuple(
-            pair for pair, a, b in zip(pairs, one, other, strict=True) if a > share * b
-        )
-        return Verdict("does not hold" if wrong else "holds", tuple(pairs), wrong)
+        wrong = tuple(p for p in pairs if one[p.body - 1] > share * other[p.body - 1])
+        holds = all(a <= share * b for a, b in zip(one, other, strict=True))
+        return Verdict("holds" if holds else "does not hold", tuple(pairs), wrong)
 
     return rule
 

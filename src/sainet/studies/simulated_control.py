@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from sainet.control.config import ControlConfig
 from sainet.control.record import EpisodeRecord
 from sainet.control.trials import measure_trials, run_trials
-from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.claims import Claim, solves_more
 from sainet.evaluation.measurements import (
     Condition,
@@ -21,20 +20,16 @@ from sainet.evaluation.measurements import (
     PublishedValues,
 )
 from sainet.models.identity import ModelId
-from sainet.studies.paper_setup import IN, SAIN
-from sainet.studies.steps import Join, Step
+from sainet.models.library import Model
+from sainet.studies.paper_setup import IN, SAIN, physics
+from sainet.studies.steps import Join, Load, Step, Train
 from sainet.studies.study import Plan, Scope, Study
 
 if TYPE_CHECKING:
     from sainet.studies.runner import Bar, Runner
 
 TRIALS = {"quick": 4, "paper": 100}
-MODELS = (
-    ModelId(kind="physics", simulator=SIMULATORS["planar"]),
-    ModelId(kind="physics", simulator=SIMULATORS["planar-true"]),
-    IN,
-    SAIN,
-)
+MODELS = (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
 GOALS = ("easy", "hard")
 PLANNERS = ("greedy", "tree")
 _FACTORS = ("world", "goals", "planner", "given_properties", "disks")
@@ -44,7 +39,7 @@ _FACTORS = ("world", "goals", "planner", "given_properties", "disks")
 class RunTrials(Step[Measurements]):
     """Control trials of models on the same goals."""
 
-    models: tuple[ModelId, ...]  # shipped
+    models: tuple[Step[Model], ...]  # shipped, or trained by a step
     config: ControlConfig  # of every model
     condition: Condition
 
@@ -56,14 +51,16 @@ class RunTrials(Step[Measurements]):
     def run(self, runner: "Runner") -> Measurements:
         """Return the outcomes; finished episodes are kept."""
         records = {}
-        for model in self.models:
-            config = replace(self.config, model=model.slug)
-            title = f"Pushing ({model.slug}, {self.name})"
+        for step in self.models:
+            model = runner.result(step)
+            source = str(model.folder) if isinstance(step, Train) else model.name
+            config = replace(self.config, model=source)
+            title = f"Pushing ({model.name}, {self.name})"
             with runner.bar(title, config.trials) as bar:
                 solved: list[bool] = []
-                records[model] = run_trials(
+                records[model.id] = run_trials(
                     config,
-                    runner.folder(self) / model.slug,
+                    runner.folder(self) / model.name,
                     executor=runner.executor,
                     on_episode=partial(_count, bar, solved),
                 )
@@ -102,7 +99,9 @@ def _trials(label: str, config: ControlConfig) -> RunTrials:
     return RunTrials(MODELS, config, Condition(label=label, factors=factors))
 
 
-def _published(condition: str, model: ModelId, success: float) -> PublishedValues:
+def published_success(
+    condition: str, model: ModelId, success: float
+) -> PublishedValues:
     """Return the published share of solved trials of one model."""
     return PublishedValues(
         condition=condition,
@@ -114,10 +113,10 @@ def _published(condition: str, model: ModelId, success: float) -> PublishedValue
 
 # Of the paper (Ajay et al., ICRA 2019): Bullet's world, the paper's search.
 PUBLISHED_SIMULATED_CONTROL = (
-    _published("easy, greedy", IN, 1.00),
-    _published("hard, greedy", IN, 0.88),
-    _published("easy, greedy", SAIN, 1.00),
-    _published("hard, greedy", SAIN, 1.00),
+    published_success("easy, greedy", IN, 1.00),
+    published_success("hard, greedy", IN, 0.88),
+    published_success("easy, greedy", SAIN, 1.00),
+    published_success("hard, greedy", SAIN, 1.00),
 )
 STUDY = Study(
     question="How many goals does each model solve, with the paper's search and with "
