@@ -230,7 +230,7 @@ class EmulatedController:
                 sent.append((0.0, self._before, False))
             case Kind.FLOOD if first:
                 for _ in range(120):
-                    self.sequence += 1
+                    self.sequence = (self.sequence + 1) % (1 << 32)
                     sent.append((0.0, self.message(), False))
             case Kind.TRUNCATE | Kind.NOISE if first:
                 sent = [(0.0, self._spoiled(good), False)]

@@ -46,7 +46,7 @@ REASONS = {
     Kind.REPEAT: "repeated",
     Kind.REORDER: "missing|out of order",
     Kind.OLD: "out of order",
-    Kind.BUNCH: "no feedback",
+    Kind.BUNCH: "no feedback|missing",
     Kind.FLOOD: "arrived at once|frozen",
     Kind.BACKWARD: "out of order",
     Kind.TRUNCATE: "corrupt",
@@ -118,7 +118,8 @@ class Tally:
     troubles: Counter = field(default_factory=Counter)  # by kind of fault
     violations: list[str] = field(default_factory=list)
     unasked: list[str] = field(default_factory=list)  # stopped without a fault
-    # s, from the last good message to the last command, and to the arm's return
+    # s, from the sending of the last good message to the last command, and, where
+    # messages end, from its arrival to the end of the motion
     commands: list[float] = field(default_factory=list)
     decisions: list[float] = field(default_factory=list)
     real_time: bool = False  # a busy machine may be late
@@ -132,7 +133,7 @@ class Tally:
         self.violations += [f"push {self.pushes}, {fault}: {each}" for each in found]
         if stroke.trouble and math.isnan(report.faulty):
             self.unasked.append(stroke.trouble)
-        elif stroke.trouble and fault and fault.kind not in SLOW:
+        elif fault and not fault.harmless and fault.kind not in SLOW:
             self.commands.append(report.answers[-1].time - report.last_sent)
             if fault.kind in (Kind.SILENCE, Kind.STALL):
                 self.decisions.append(end - stroke.time[-1])
@@ -263,16 +264,16 @@ def show(tally: Tally, seconds: float) -> None:
     print(f"stopped without an injected fault: {len(tally.unasked)}")
     for each in tally.unasked[:5]:
         print("  ", each)
-    for name in ("commands", "decisions"):
-        delays = 1000 * np.array(getattr(tally, name))
-        if len(delays):
-            low, middle, high = np.percentile(delays, [0, 50, 99.9])
-            what = "sent to last command" if name == "commands" else "received to stop"
+    print("from the last good feedback (ms; cycles)")
+    ends = {"to the last command": tally.commands, "to the end": tally.decisions}
+    for name, seconds_each in ends.items():
+        if seconds_each:
+            delays = np.percentile(seconds_each, [0, 50, 99.9, 100])
+            ms = ", ".join(f"{1000 * delay:.3f}" for delay in delays)
+            cycles = delays[-1] / CYCLE
             print(
-                f"last good feedback {what}: "
-                f"{len(delays)} cases, least {low:.3f}, median {middle:.3f}, 99.9th "
-                f"percentile {high:.3f}, largest {delays.max():.3f} ms "
-                f"({delays.max() / 1000 / CYCLE:.3f} cycles)"
+                f"  {name}: least, median, 99.9th percentile and largest of "
+                f"{len(seconds_each)}: {ms} ms ({cycles:.3f} cycles)"
             )
 
 

@@ -1,9 +1,8 @@
 """Arms that follow paths, and the rehearsal that sends nothing."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import TracebackType
 from typing import ClassVar, final
 
 import numpy as np
@@ -18,6 +17,10 @@ class NoFeedback(SainetError):
     """A controller that sends no usable feedback."""
 
 
+Point = Float[np.ndarray, "3"]  # m, in the base frame
+Sample = tuple[float, Point, Point]  # s; m, answer to a message; m, in the message
+
+
 @dataclass(frozen=True, kw_only=True)
 class Stroke:
     """Samples of one motion: one for each message that was answered."""
@@ -26,6 +29,17 @@ class Stroke:
     commanded: Float[np.ndarray, "sample 3"]  # m, answer to the message
     measured: Float[np.ndarray, "sample 3"]  # m, in the message
     trouble: str = ""  # why the motion was stopped or refused; empty: it was not
+
+    @classmethod
+    def of(cls, samples: Sequence[Sample], trouble: str = "") -> "Stroke":
+        """Return the stroke with these samples."""
+        time, commanded, measured = zip(*samples, strict=True) if samples else ((),) * 3
+        return cls(
+            time=np.array(time),
+            commanded=np.reshape(commanded, (-1, 3)),
+            measured=np.reshape(measured, (-1, 3)),
+            trouble=trouble,
+        )
 
 
 def unwatched() -> str:
@@ -64,43 +78,12 @@ class AbstractArm(ABC):
         """Return the arm."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Let go of the arm."""
         self.close()
 
     def close(self) -> None:  # noqa: B027
         """Let go of the arm."""
-
-
-class Samples:
-    """Samples of a stroke while it is made."""
-
-    def __init__(self) -> None:
-        """Start without samples."""
-        self._rows: list[tuple[float, np.ndarray, np.ndarray]] = []
-
-    def add(
-        self,
-        time: float,
-        commanded: Float[np.ndarray, "3"],
-        measured: Float[np.ndarray, "3"],
-    ) -> None:
-        """Add a time (s), the answer (m) and the measured position (m)."""
-        self._rows.append((time, commanded, measured))
-
-    def stroke(self, trouble: str = "") -> Stroke:
-        """Return the stroke so far, with the reason why it was stopped."""
-        return Stroke(
-            time=np.array([row[0] for row in self._rows]),
-            commanded=np.array([row[1] for row in self._rows]).reshape(-1, 3),
-            measured=np.array([row[2] for row in self._rows]).reshape(-1, 3),
-            trouble=trouble,
-        )
 
 
 @final
@@ -135,13 +118,13 @@ class DryArm(AbstractArm):
         self, path: Float[np.ndarray, "time 3"], watch: Callable[[], str] = unwatched
     ) -> Stroke:
         """Show the positions of a path (m), if the limits allow it."""
-        samples = Samples()
+        samples: list[Sample] = []
         try:
             for row in self._limits.rows(self._position, path):
                 self._show(self._time, row)
-                samples.add(self._time, row, row)
+                samples.append((self._time, row, row))
                 self._time += CYCLE
                 self._position = row
         except Stopped as stopped:
-            return samples.stroke(str(stopped))
-        return samples.stroke()
+            return Stroke.of(samples, str(stopped))
+        return Stroke.of(samples)

@@ -1,7 +1,11 @@
 """Clocks, so that the same code runs in real time and in simulated time."""
 
+import gc
+import os
 import time
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import final
 
 
@@ -16,6 +20,10 @@ class AbstractClock(ABC):
     def wait(self, seconds: float) -> None:
         """Let time pass."""
 
+    def undisturbed(self) -> AbstractContextManager[None]:
+        """Return a context that is interrupted as little as possible."""
+        return nullcontext()
+
 
 @final
 class RealClock(AbstractClock):
@@ -28,6 +36,25 @@ class RealClock(AbstractClock):
     def wait(self, seconds: float) -> None:
         """Let time pass."""
         time.sleep(seconds)
+
+    @contextmanager
+    def undisturbed(self) -> Iterator[None]:
+        """Keep out garbage collection and, where permitted, other processes.
+
+        A thread of real-time priority that waits for messages needs little of a
+        processor.
+        """
+        collected = gc.isenabled()
+        gc.disable()
+        policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+        try:
+            yield
+        finally:
+            os.sched_setscheduler(0, policy, priority)
+            if collected:
+                gc.enable()
 
 
 @final

@@ -1,15 +1,12 @@
 """The arm that is moved by ABB's Externally Guided Motion (EGM)."""
 
-import gc
-import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
 from typing import final
 
 import numpy as np
 from jaxtyping import Float
 
-from sainet.robots.wire.arm import AbstractArm, NoFeedback, Samples, Stroke, unwatched
+from sainet.robots.wire.arm import AbstractArm, NoFeedback, Sample, Stroke, unwatched
 from sainet.robots.wire.clock import AbstractClock, RealClock
 from sainet.robots.wire.egm import (
     Feedback,
@@ -98,17 +95,17 @@ class EgmArm(AbstractArm):
         Returns:
             The samples, with the reason if the motion was refused or stopped.
         """
-        samples = Samples()
+        samples: list[Sample] = []
         try:
             watchdog, rest = self._ready()
             rows = self._limits.rows(rest.position, path)
-            with _undisturbed():
+            with self._clock.undisturbed():
                 for _ in self._stream(rows, rest.orientation, watchdog, samples):
                     if reason := watch():
                         raise Stopped(reason)
         except Stopped as stopped:
-            return samples.stroke(str(stopped))
-        return samples.stroke()
+            return Stroke.of(samples, str(stopped))
+        return Stroke.of(samples)
 
     def _ready(self) -> tuple[Watchdog, Feedback]:
         """Return the feedback of an arm that rests and executes motion.
@@ -147,7 +144,7 @@ class EgmArm(AbstractArm):
         rows: Float[np.ndarray, "row 3"],
         orientation: Quaternion,
         watchdog: Watchdog,
-        samples: Samples,
+        samples: list[Sample],
     ) -> Iterator[None]:
         """Answer each message with the next row; yield after each answer."""
         row, moved = -1, -np.inf
@@ -159,7 +156,7 @@ class EgmArm(AbstractArm):
                 row, moved = row + 1, now
             self._answer(now, rows[row], orientation)
             watchdog.commanded(rows[row])
-            samples.add(now, rows[row], feedback.position)
+            samples.append((now, rows[row], feedback.position))
             yield
 
     def _next(self, watchdog: Watchdog) -> tuple[Feedback, float]:
@@ -182,22 +179,3 @@ class EgmArm(AbstractArm):
         self._sent += 1
         stamp = int(1000 * now)
         self._transport.send(encode_command(self._sent, stamp, position, orientation))
-
-
-@contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Keep garbage collection and, where permitted, other processes from interrupting.
-
-    A thread of real-time priority that waits for messages takes little of a processor.
-    """
-    collected = gc.isenabled()
-    gc.disable()
-    policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
-    with suppress(OSError):
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-    try:
-        yield
-    finally:
-        os.sched_setscheduler(0, policy, priority)
-        if collected:
-            gc.enable()
