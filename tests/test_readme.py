@@ -22,6 +22,7 @@ def shell_lines(text: str) -> list[str]:
     blocks = re.findall(r"^```bash\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     blocks += re.findall(r"^    ((?:sainet|make) .*)", text, re.MULTILINE)
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    lines = [line.partition(" > ")[0] for line in lines]  # into a file
     words = (shlex.split(line.removeprefix("$ "), comments=True) for line in lines)
     return [shlex.join(line) for line in words if line]
 
