@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.engines import make_engine
-from sainet.engines.base import roll_out
+from sainet.engines.base import AbstractEngine
 from sainet.robots.wire.limits import CYCLE
 from sainet.scenes.controls import PathControls
 from sainet.scenes.scene import Scene
@@ -68,13 +68,17 @@ class EmulatedTable:
         return np.column_stack([state.position, state.angle])
 
     def _flush(self) -> None:
-        path = np.array(self._path)
+        path = np.array(self._path, np.float32)
         self._path = []
         # Two lengths only, so that two programs are compiled.
         parts = [path] if len(path) == CHUNK else [row[None] for row in path]
         for part in parts:
-            start = np.asarray(self._state.pusher_position)
-            speed = np.diff(part, axis=0, prepend=start[None]) / CYCLE
-            controls = PathControls(jnp.asarray(part), jnp.asarray(speed))
-            trajectory = roll_out(self._engine, self.scene, self._state, controls)
-            self._state = trajectory.final
+            self._state = advanced(self._engine, self.scene, self._state, part)
+
+
+@eqx.filter_jit
+def advanced(engine: AbstractEngine, scene: Scene, state: State, path) -> State:
+    """The state after the pusher went along a path (m), one row for each cycle."""
+    start = jnp.concatenate([state.pusher_position[None], path[:-1]])
+    controls = PathControls(path, (path - start) / CYCLE)
+    return engine.rollout(scene, state, controls).final
