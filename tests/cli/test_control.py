@@ -41,3 +41,6 @@ def test_the_command_on_the_page_parses():
     odd = ControlConfig(model="runs/my net; ls", trials=3)
     words = shlex.split(control._command(odd))
     assert words[2:] == ["--model", "runs/my net; ls", "--trials", "3", "--animate"]
+    swapped = ControlConfig(robot="lab", swapped=True)
+    words = shlex.split(control._command(swapped))
+    assert words[2:] == ["--robot", "lab", "--swapped", "--animate"]

@@ -1,6 +1,7 @@
 """`sainet control`."""
 
 import shlex
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,11 +18,17 @@ if TYPE_CHECKING:
     from sainet.evaluation.trials import TrialRow
 
 _DRAWN = 6  # episodes
+# Settings that say where episodes were, in the result.
+_PLACES = {
+    "simulated": ("world",),
+    "lab": ("robot", "lab", "surface", "swapped"),
+    "abb": ("robot",),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Control:
-    """Push the target disk to goals by pushing disk 1, in a simulated world."""
+    """Push the target disk to goals by pushing disk 1, simulated or with a robot."""
 
     config: ControlConfig = field(default_factory=ControlConfig)
     out: Path = Path("runs/control")
@@ -45,16 +52,22 @@ class Control:
         model, _ = prepare(config)
         for doubt in doubts_of_training(model.card, config.disks):
             self.output.warn(f"{config.model}: {doubt}.")
+        if config.dry_run:
+            return self._rehearse()
         solved = 0
         bar = progress_bar(f"Pushing ({config.model})", config.trials, self.output)
-        with worker_pool(self.workers) as pool, bar as advance:
+        # A physical robot executes one episode after another.
+        pool = nullcontext() if config.is_physical else worker_pool(self.workers)
+        with pool as executor, bar as advance:
 
             def on_episode(record: "EpisodeRecord") -> None:
                 nonlocal solved
                 solved += record.solved
                 advance(1, f"{solved} solved")
 
-            records = run_trials(config, self.out, executor=pool, on_episode=on_episode)
+            records = run_trials(
+                config, self.out, executor=executor, on_episode=on_episode
+            )
         figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
         if self.animate:
             self._animate(records[:_DRAWN])
@@ -64,9 +77,18 @@ class Control:
         self.output.say(f"Episodes are in {self.out}, {drawn} drawn in {figure}.")
         names = {
             name: getattr(config, name)
-            for name in ("model", "goals", "planner", "world")
+            for name in ("model", "goals", "planner", *_PLACES[config.robot])
         }
         return names | row.to_dict() | {"episodes": str(self.out / "episodes")}
+
+    def _rehearse(self) -> Json:
+        """Show the commands of the first push of every trial."""
+        from sainet.control.trials import rehearse_trials
+
+        bar = progress_bar("Rehearsing", self.config.trials, self.output)
+        with bar as advance:
+            rehearse_trials(self.config, on_trial=lambda trial: advance(1, ""))
+        return {"dry_run": True, "trials": self.config.trials}
 
     def _animate(self, records: list["EpisodeRecord"]) -> None:
         from sainet.report.figures.video import best_format, frame_count, write_film
@@ -81,13 +103,22 @@ class Control:
         config = self.config
         report = Report(
             title=f"{config.planner.capitalize()} search, {config.goals} goals",
-            subtitle=f"{config.model} plans, the world is simulated in {config.world}",
+            subtitle=f"{config.model} plans, {_place(config)}",
             episodes=records,
             manifest=read_json(self.out / MANIFEST),
             commands=(_command(config),),
         )
         page = write_report(report, self.out / "replay.html")
         self.output.say(f"{film} shows the first episode; {page} plays {len(records)}.")
+
+
+def _place(config: ControlConfig) -> str:
+    """Return where the episodes took place."""
+    return {
+        "simulated": f"the world is simulated in {config.world}",
+        "lab": f"in virtual lab {config.lab} on {config.surface}",
+        "abb": "a physical robot pushes",
+    }[config.robot]
 
 
 def _outcome(config: ControlConfig, found: "TrialRow") -> str:
@@ -108,6 +139,9 @@ def _command(config: ControlConfig) -> str:
         word
         for name, value in asdict(config).items()
         if value != getattr(usual, name)
-        for word in (f"--{name.replace('_', '-')}", str(value))
+        for word in (
+            f"--{name.replace('_', '-')}",
+            *([] if value is True else [str(value)]),
+        )
     ]
     return shlex.join(["sainet", "control", *options, "--animate"])

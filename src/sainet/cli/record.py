@@ -23,9 +23,13 @@ class Record:
     def run(self) -> Json:
         """Record the pushes and import them."""
         use_cache()
-        from sainet.control.collect import DATASET, collect, summary_of
+        from sainet.control.collect import DATASET, collect, rehearse, summary_of
 
         bar = progress_bar("Pushing", self.config.pushes, self.output)
+        if self.config.dry_run:
+            with bar as advance:
+                rehearse(self.config, on_pushes=lambda pushes: advance(pushes, ""))
+            return {"dry_run": True, "pushes": self.config.pushes}
         with bar as advance:
             store = collect(
                 self.config, self.out, on_pushes=lambda pushes: advance(pushes, "")

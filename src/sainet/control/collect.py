@@ -78,10 +78,7 @@ def collect(
         BadInput: a recording is damaged, or none can be used.
         SainetError: the robot failed several times in a row.
     """
-    model = None
-    if config.planner:
-        model = load_model(config.model)
-        model.check_fits("robot", TIME_STEP)
+    model = _planning_model(config)
     known = {"command": "record", "weights": model and model.digest}
     settings = {**known, **config.settings()}
     folder = open_run(out, settings, finished_by=SUMMARY)
@@ -89,6 +86,16 @@ def collect(
         _record(config, out, model, on_pushes)
         _import(config, out, settings)
     return open_store(out / DATASET)
+
+
+def rehearse(config: CollectConfig, *, on_pushes: Callable[[int], None]) -> None:
+    """Show the commands of a dry run; nothing is sent, moved or written."""
+    model = _planning_model(config)
+    with make_robot(config, config.seed) as robot:
+        session = _Session(config, robot, model)
+        for index in range(config.pushes):
+            session.push(index, None)
+            on_pushes(1)
 
 
 def summary_of(out: Path) -> Collected:
@@ -99,6 +106,15 @@ def summary_of(out: Path) -> Collected:
 def push_file(out: Path, index: int) -> Path:
     """Return the file of one push."""
     return out / RECORDINGS / f"{index:06d}.json"
+
+
+def _planning_model(config: CollectConfig) -> Model | None:
+    """Return the model that plans; None for random pushes."""
+    if config.planner is None:
+        return None
+    model = load_model(config.model)
+    model.check_fits("robot", TIME_STEP)
+    return model
 
 
 def _record(
@@ -198,8 +214,8 @@ class _Session:
     def _arrange(self, rng: np.random.Generator) -> State:
         """Return the measured poses after arranging the disks at random."""
         radius = np.asarray(self.robot.scene.radius)
+        wanted = scattered(rng, radius, self.config.area_mm / 1000)
         for _ in range(_ATTEMPTS):
-            wanted = scattered(rng, radius, self.config.area_mm / 1000)
             self.robot.arrange(wanted)
             observed = self.robot.observe()
             if self._is_usable(observed):

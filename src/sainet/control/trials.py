@@ -96,6 +96,18 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
     return index
 
 
+def rehearse_trials(config: ControlConfig, *, on_trial: Callable[[int], None]) -> None:
+    """Show the commands of the first push of every trial; nothing is sent."""
+    model, planner = prepare(config)
+    for index in range(config.trials):
+        trial = make_trial(config, index)
+        with trial.robot as robot:
+            run_episode(
+                robot, planner, model.dynamics, trial.task, trial.scene, pushes=1
+            )
+        on_trial(index)
+
+
 def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     """Return model and planner; loading the same model again compiles nothing.
 

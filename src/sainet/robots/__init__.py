@@ -1,7 +1,7 @@
 """Robots, which observe disks and execute pushes, and their settings; free of JAX."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -48,6 +48,9 @@ class RobotConfig:
     their centres (mm; lab and abb)."""
     config: Path | None = None
     """Configuration of the cell of the physical robot (TOML). Default: none."""
+    # Not part of any run: nothing is recorded.
+    dry_run: bool = field(default=False, repr=False, compare=False)
+    """Show every command to the physical robot, and send none."""
 
     def __post_init__(self) -> None:
         """Check every setting."""
@@ -64,6 +67,8 @@ class RobotConfig:
         known = self.is_physical == (self.config is not None)
         wanted = f"the file of a cell if `robot` is {_PHYSICAL}, and left out otherwise"
         require(known, "config", wanted, self.config)
+        can_be = not self.dry_run or self.is_physical
+        require(can_be, "dry_run", f"false unless `robot` is {_PHYSICAL}", self.dry_run)
         still = not self.swapped or self.robot == "lab"
         require(still, "swapped", "false unless `robot` is lab", self.swapped)
 
@@ -79,7 +84,9 @@ class RobotConfig:
 
     def settings(self) -> Mapping[str, object]:
         """Return every setting as a JSON value, for run folders."""
-        return asdict(self) | {"config": self.config and str(self.config)}
+        found = asdict(self) | {"config": self.config and str(self.config)}
+        del found["dry_run"]
+        return found
 
 
 def make_robot(config: RobotConfig, *seed: int) -> "AbstractRobot":

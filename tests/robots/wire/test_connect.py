@@ -3,7 +3,7 @@
 import io
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -16,7 +16,12 @@ from msgspec.structs import replace
 from robots.wire.emulated_table import EmulatedTable
 from robots.wire.emulated_tracker import EmulatedTracker, free_port
 from robots.wire.real_controller import RealController
+from sainet.cli.entry import run
+from sainet.control.collect import SUMMARY, collect, push_file, summary_of
+from sainet.control.collected import read_push
+from sainet.control.config import CollectConfig
 from sainet.robots import RobotConfig, make_robot
+from sainet.robots.wire.abb import AbbRobot
 from sainet.robots.wire.cell import Cell, read_cell
 from sainet.robots.wire.connect import ask_operator, connect
 from sainet.robots.wire.limits import CYCLE
@@ -149,3 +154,42 @@ def test_the_operator_confirms_on_the_terminal(monkeypatch, capsys):
     assert "Put the disks there. Then press Enter." in capsys.readouterr().err
     with pytest.raises(SainetError, match="nobody is at the terminal"):
         ask_operator("Put the disks there.")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["record", "control"])
+def test_a_dry_run_shows_every_command_and_sends_none(
+    tmp_path, monkeypatch, capsys, command
+):
+    cell, out = example(), tmp_path / "out"
+    monkeypatch.setattr(AbbRobot, "arrange", lambda self, state: None)  # they lie well
+    words = [command, "--robot", "abb", "--config", str(written(tmp_path, cell))]
+    words += ["--out", str(out), "--dry-run", "--quiet"]
+    words += ["--pushes", "1"] if command == "record" else ["--trials", "1"]
+    words += [] if command == "record" else ["--model", "physics"]
+    with running(cell) as controller:
+        assert run(words) == 0
+        assert controller.report().answers == []
+    shown = [line for line in capsys.readouterr().err.splitlines() if " mm" in line]
+    # The push itself: 10 mm at 50 mm/s, one command each 4 ms; and the ways to it.
+    assert len(shown) > 100
+    assert not out.exists()
+
+
+@pytest.mark.slow
+def test_pushes_of_a_cell_are_recorded_in_files(tmp_path, monkeypatch):
+    cell, out = example(), tmp_path / "out"
+    monkeypatch.setattr(AbbRobot, "arrange", lambda self, state: None)
+    settings = {"robot": "abb", "config": written(tmp_path, cell), "gap_mm": 5.0}
+    config = CollectConfig(**settings, pushes=1, area_mm=2000.0)
+    with running(cell), suppress(BadInput):  # a busy machine may stop the push
+        collect(config, out)
+    found = read_push(push_file(out, 0))
+    assert found.surface == cell.surface
+    assert found.commanded is not None
+    radius = [each.radius_mm / 1000 for each in cell.disks]
+    assert found.radius == pytest.approx(radius)
+    if found.trouble:
+        assert not (out / SUMMARY).exists()
+    else:
+        assert summary_of(out).usable == 1

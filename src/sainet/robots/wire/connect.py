@@ -34,7 +34,13 @@ def abb_robot(config: RobotConfig, *_seed: int) -> AbbRobot:
             f"{config.config}: it has {len(cell.disks)} [[disks]], not {config.disks}; "
             "list every disk on the table, the pushed one first."
         )
-    return connect(cell)
+    return connect(cell, show=show_command if config.dry_run else None)
+
+
+def show_command(time: float, position: Float[np.ndarray, "3"]) -> None:
+    """Print a command of a dry run, in the frame of the robot's base."""
+    x, y, z = 1000 * position
+    print(f"{time:8.3f} s {x:9.2f} {y:9.2f} {z:9.2f} mm", file=sys.stderr)
 
 
 def ask_operator(request: str) -> None:
