@@ -113,13 +113,7 @@ def summarise(measured: Measurements, *, subject: str = "") -> Summary:
         provenance=header.provenance,
     )
     if measured.is_of_trials:
-        return msgspec.structs.replace(
-            found,
-            trials=trial_rows(measured),
-            tests=compare_trials(measured),
-            outcomes=tuple(trial_outcomes(measured)),
-            differences=tuple(trial_differences(measured)),
-        )
+        return _of_trials(measured, found)
     rows: list[Row] = []
     predictions: list[Row] = []
     factors: list[Factor] = []
@@ -147,6 +141,16 @@ def summarise(measured: Measurements, *, subject: str = "") -> Summary:
         predictions=tuple(predictions),
         comparisons=tuple(compared),
         factors=tuple(factors),
+    )
+
+
+def _of_trials(measured: Measurements, found: Summary) -> Summary:
+    return msgspec.structs.replace(
+        found,
+        trials=trial_rows(measured),
+        tests=compare_trials(measured),
+        outcomes=tuple(trial_outcomes(measured)),
+        differences=tuple(trial_differences(measured)),
     )
 
 
