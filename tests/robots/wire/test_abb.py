@@ -16,7 +16,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from robots.wire.emulated_controller import EmulatedController, SimulatedLink
+from robots.wire.emulated_controller import (
+    EmulatedController,
+    Fault,
+    Kind,
+    SimulatedLink,
+)
 from robots.wire.emulated_table import EmulatedTable
 from robots.wire.emulated_tracker import FAULTS, EmulatedTracker, free_port
 from sainet.datasets.recorded.resample import resample
@@ -222,6 +227,44 @@ def test_every_fault_of_the_tracker_stops_the_arm_with_its_reason(fault, during)
     assert np.abs(pose - TABLE).max() < 0.02  # no faulty pose among them
     if during == "approach":
         assert recording.commanded is None and len(recording.time) == 1
+
+
+BROKEN = {
+    Kind.SILENCE: "no feedback",
+    Kind.REPEAT: "came twice",
+    Kind.TRUNCATE: "corrupt",
+    Kind.JUMP: "off the commanded path",
+    Kind.STRANGER: "another sender",
+    Kind.RAPID: "RAPID program is stopped",
+}
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+@pytest.mark.parametrize("during", ["approach", "push"])
+def test_every_fault_of_the_controller_is_recorded(kind, during):
+    with loop() as made:
+        made.robot.observe()
+        route = made.robot._route(made.robot.truth, PUSH)  # noqa: SLF001
+        lead = 2 * CELL.limits.lag_cycles
+        into = 50 if during == "approach" else len(route.approach) + lead + 30
+        made.controller.fault = Fault(kind, into)
+        recording = made.robot.push(PUSH)
+        sent = made.sent
+    assert BROKEN[kind] in recording.trouble
+    assert len(sent) <= into + 5
+    assert (recording.commanded is None) == (len(recording.time) == 1)
+    assert (len(recording.time) == 1) == (during == "approach")
+
+
+def test_a_controller_that_stops_before_the_straight_motion_is_recorded():
+    with loop() as made:
+        made.robot.observe()
+        route = made.robot._route(made.robot.truth, PUSH)  # noqa: SLF001
+        rows = len(CELL.limits.rows(made.controller.place, route.approach))
+        made.controller.fault = Fault(Kind.MOTORS, rows)
+        recording = made.robot.push(PUSH)
+    assert "motors are off" in recording.trouble
+    assert recording.commanded is None and len(recording.time) == 1
 
 
 def test_a_stopped_push_is_recorded_as_far_as_it_was_commanded():

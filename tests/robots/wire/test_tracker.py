@@ -103,6 +103,8 @@ def test_damaged_packets_are_reported_and_raise_nothing():
     twice = packet(1, {"a": Rigid(np.eye(3), np.ones(3))})
     twice = twice[:4] + b"\2" + twice[5:80] + twice[5:80]
     assert "twice" in decode(twice, 0.0).trouble
+    lines = packet(1, {"a\nb": Rigid(np.eye(3), np.ones(3))})
+    assert "unprintable" in decode(lines, 0.0).trouble
 
 
 def test_the_stream_listens_to_the_configured_address_only():

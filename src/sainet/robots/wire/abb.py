@@ -170,6 +170,8 @@ class AbbRobot(AbstractRobot):
         if trouble:
             return unexecuted(self._cell, state, push, trouble)
         stroke, found = self._follow(route.straight)
+        if not len(stroke.time):
+            return unexecuted(self._cell, state, push, stroke.trouble)
         later = "" if stroke.trouble else self._follow(route.retreat)[0].trouble
         executed = Execution(self._cell, state, push, route, stroke, found)
         return executed.recording(self._arm.rehearsal or executed.problem or later)

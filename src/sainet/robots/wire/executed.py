@@ -24,7 +24,10 @@ _FEWEST = 10  # frames from which the tracker's clock is estimated
 
 @dataclass(frozen=True)
 class Execution:
-    """The straight motion of a push, as arm and tracker measured it."""
+    """The straight motion of a push, as arm and tracker measured it.
+
+    The stroke has at least one sample.
+    """
 
     cell: Cell
     state: State  # observed before
@@ -56,18 +59,16 @@ class Execution:
         Args:
             trouble: why the push differs from the wanted one.
         """
-        seen = tracker_times(self.found)
-        time = np.union1d(self.stroke.time, seen)
+        exposed = tracker_times(self.found)
+        time = np.union1d(self.stroke.time, exposed)
         pose = np.full((len(time), len(self.cell.disks), 3), np.nan)
         pusher = np.full((len(time), 2), np.nan)
-        pose[np.searchsorted(time, seen)] = np.array(
-            [each.pose for each in self.found]
-        ).reshape(-1, *pose.shape[1:])
-        pusher[np.searchsorted(time, self.stroke.time)] = self._on_table(
-            self.stroke.measured
-        )
+        for row, each in zip(np.searchsorted(time, exposed), self.found, strict=True):
+            pose[row] = each.pose
+        rows = np.searchsorted(time, self.stroke.time)
+        pusher[rows] = self._on_table(self.stroke.measured)
         return Recording(
-            time=time - time[:1].sum(),
+            time=time - time[0],
             pose=pose,
             pusher=pusher,
             commanded=self._commanded(),
@@ -82,8 +83,6 @@ class Execution:
 
     def _commanded(self) -> Push | None:
         """Return the push as far as it was commanded; None: not up to the contact."""
-        if not len(self.stroke.commanded):
-            return None
         end = self._on_table(self.stroke.commanded[-1:])[0]
         length = float((end - self.route.contact) @ self.route.heading)
         if length <= 0:

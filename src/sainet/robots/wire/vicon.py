@@ -51,8 +51,8 @@ def _bodies(packet: bytes) -> Iterator[tuple[str, Rigid]]:
                 raise ValueError(f"an object of {size} bytes")
             raw, *values = _POSE.unpack_from(packet, start)
             name = raw.partition(b"\0")[0].decode()
-            if name in names:
-                raise ValueError("an object appears twice")
+            if name in names or not name.isprintable():
+                raise ValueError("an object appears twice, or has an unprintable name")
             names.add(name)
             if any(values):  # all zero: the object is not visible
                 yield name, _pose(np.array(values))
