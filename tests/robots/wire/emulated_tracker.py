@@ -33,11 +33,12 @@ USED = 5 + 2 * 75  # bytes of a packet with two objects
 
 def packet(number: int, bodies: dict[str, Rigid], size: int = 512) -> bytes:
     """The bytes of one frame, written from Vicon's description."""
-    items = b""
-    for name, body in bodies.items():
-        angles = Rotation.from_matrix(body.rotation).as_euler("XYZ")
-        values = [*1000 * body.shift, *angles]
-        items += struct.pack("<BH24s6d", 0, 72, name.encode(), *values)
+    turns = Rotation.from_matrix([body.rotation for body in bodies.values()])
+    angles = turns.as_euler("XYZ")
+    items = b"".join(
+        struct.pack("<BH24s6d", 0, 72, name.encode(), *1000 * body.shift, *angle)
+        for (name, body), angle in zip(bodies.items(), angles, strict=True)
+    )
     made = struct.pack("<IB", number, len(bodies)) + items
     assert len(made) <= size
     return made.ljust(size, b"\0")
@@ -114,17 +115,18 @@ class EmulatedTracker:
             noise[0, 3] += np.deg2rad(10)
         if fault == "nan":
             noise[0, 1] = np.nan
+        poses = self.poses()
+        turns = np.column_stack([poses[:, 2] + noise[:, 5], noise[:, 4], noise[:, 3]])
+        rotations = Rotation.from_euler("ZYX", turns).as_matrix()
+        places = np.column_stack([poses[:, :2], np.full(len(names), self.height)])
         bodies = {
-            name: self._body(pose, error)
-            for name, pose, error in zip(names, self.poses(), noise, strict=True)
+            name: self.to_tracker.after(Rigid(rotation, place))
+            for name, rotation, place in zip(
+                names, rotations, places + noise[:, :3], strict=True
+            )
         }
         if fault == "hide":
             del bodies[names[0]]
         order = self.rng.permutation(list(bodies))  # as when visibility changes
         self.frozen = {str(name): bodies[name] for name in order}
         return self.frozen
-
-    def _body(self, pose: np.ndarray, error: np.ndarray) -> Rigid:
-        turned = Rotation.from_euler("ZYX", [pose[2] + error[5], error[4], error[3]])
-        shift = np.array([*pose[:2], self.height]) + error[:3]
-        return self.to_tracker.after(Rigid(turned.as_matrix(), shift))

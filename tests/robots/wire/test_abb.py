@@ -54,6 +54,7 @@ TO_ROBOT = CELL.calibration.table_to_robot
 TO_TABLE = TO_ROBOT.inverse
 TO_TRACKER = CELL.calibration.tracker_to_table.inverse
 NAMES = [disk.body for disk in CELL.disks]
+LIFTED = 0.02  # m: above it the pusher touches nothing, and disks rest
 TIP = (-0.13, 0.05)  # m, on the table, at the start
 APART = 2 * 0.0525
 TABLE = np.array([[-0.05, 0.02, 2.0], [-0.05 + APART, 0.02, -1.0]])
@@ -84,7 +85,8 @@ class Loop:
     def tick(self, tool: np.ndarray) -> None:
         tip = TO_TABLE.moved(tool)
         self.lowest = min(self.lowest, tip[2])
-        self.table.carry(tip)
+        if tip[2] < LIFTED:
+            self.table.carry(tip)
         self.tracker.tick()
 
     @property
