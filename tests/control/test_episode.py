@@ -183,3 +183,15 @@ def test_an_interruption_keeps_the_finished_pushes():
         run(Rail(stops_after=2), episode=episode)
     assert episode.reason == "interrupted"
     assert len(episode.steps) == 2
+
+
+def test_disks_with_a_clock_of_their_own_are_no_trouble():
+    push = jax.tree.map(lambda x: x[0], PushGrid().pushes())
+    pose = np.full((4, 2, 3), np.nan)
+    pose[::2] = 0.0
+    two_clocks = replace(
+        recorded(push), time=np.arange(4.0), pose=pose, pusher=np.zeros((4, 2))
+    )
+    assert not checked(two_clocks, push).trouble
+    pose[:, 1] = np.nan  # one disk was never measured
+    assert "NaN" in checked(replace(two_clocks, pose=pose), push).trouble

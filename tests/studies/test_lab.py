@@ -1,5 +1,6 @@
 """Studies in the virtual lab, tiny; what they count and measure, by hand."""
 
+import json
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -8,9 +9,10 @@ import numpy as np
 import pytest
 
 from report import samples
+from sainet.cli.entry import run
 from sainet.control.collect import collect
 from sainet.control.config import CollectConfig, ControlConfig
-from sainet.control.record import EpisodeRecord
+from sainet.control.record import EpisodeRecord, read_record
 from sainet.control.trial import make_trial
 from sainet.control.trials import measure_trials, prepare
 from sainet.evaluation.as_json import to_json_object
@@ -177,8 +179,7 @@ def test_outcomes_in_labs_have_paired_differences():
     assert gain.difference.value == pytest.approx(0.5)
     low, high = gain.difference.low, gain.difference.high
     assert low is not None and high is not None and low < 0.5 < high
-    json = to_json_object(found)
-    assert {"outcomes", "differences"} <= json.keys()
+    assert {"outcomes", "differences"} <= to_json_object(found).keys()
     assert any(
         "solved: SAIN, tuned minus SAIN +0.500" in s for s in trial_sentences(found)
     )
@@ -205,3 +206,28 @@ def test_assumed_properties_follow_swapped_disks_or_stay_in_order():
     way = np.asarray(trial.task.goal) - np.asarray(trial.robot.truth.position[1])
     off = abs(np.mod(np.arctan2(way[1], way[0]) - axis + np.pi, 2 * np.pi) - np.pi)
     assert off <= np.pi / 6 + 1e-6  # an easy goal
+
+
+def test_episodes_in_a_virtual_lab_are_recorded_and_printed(tmp_path, capsys):
+    require(find_spec("mujoco"), "MuJoCo is not installed")
+    words = ["control", "--robot", "lab", "--lab", "2", "--surface", "plywood"]
+    words += ["--model", "physics", "--trials", "1", "--pushes", "2"]
+    out = tmp_path / "out"
+    assert run([*words, "--out", str(out), "--workers", "1", "--json", "--quiet"]) == 0
+    printed = json.loads(capsys.readouterr().out.splitlines()[-1])
+    places = {name: printed[name] for name in ("robot", "lab", "surface", "swapped")}
+    assert places == {
+        "robot": "lab",
+        "lab": 2,
+        "surface": "plywood",
+        "swapped": False,
+    }
+    (record,) = out.glob("episodes/*.json")
+    for step in read_record(record).steps:
+        assert len(step.actual) == len(step.pusher) > 5
+        poses = np.array(step.actual, float)  # of the tracker's clock alone
+        assert np.isfinite(poses).all()
+        assert np.isfinite(np.array(step.pusher, float)).all()
+        # The disks are where the next push was planned from.
+        off = poses[-1, :, :2] - np.array(step.observed)[:, :2]
+        assert 2 < np.linalg.norm(off[0]) < 14

@@ -1,6 +1,7 @@
 """The runner: order, resumption, and networks trained at once."""
 
-from concurrent.futures import Executor, Future
+import threading
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ from sainet.runs.errors import RunConflict, SainetError
 from sainet.runs.workers import worker_pool
 from sainet.studies.paper_setup import IN, SAIN
 from sainet.studies.runner import Runner
-from sainet.studies.steps import Given, Step, Train
+from sainet.studies.steps import Apart, Given, Step, Train
 
 CONFIG = PAPER.changed(iterations=20, batch_size=8, log_every=5)
 SEEDS = (3, 4)
@@ -57,6 +58,41 @@ class Sum(Step[int]):
     def run(self, runner):
         self.log.append(self.label)
         return 1 + sum(map(runner.result, self.parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Note(Apart[str]):
+    """Writes a file in its folder, and names the thread that did so."""
+
+    label: str
+
+    def work(self, folder):
+        if not (folder / "note").exists():
+            folder.mkdir(parents=True)
+            (folder / "note").write_text(threading.current_thread().name)
+
+    def run(self, runner):
+        self.work(runner.folder(self))
+        return (runner.folder(self) / "note").read_text()
+
+
+@dataclass(frozen=True, eq=False)
+class Notes(Step[list[str]]):
+    """Who wrote each note."""
+
+    parts: tuple[Note, ...]
+
+    def run(self, runner):
+        return [runner.result(part) for part in self.parts]
+
+
+def test_work_apart_is_done_by_the_executor_where_there_are_several(tmp_path):
+    several, one = Notes((Note("a"), Note("b"))), Notes((Note("c"),))
+    with ThreadPoolExecutor(2, "worker") as executor:
+        runner = Runner(tmp_path, executor)
+        assert all("worker" in name for name in runner.result(several))
+        assert runner.result(one) == ["MainThread"]
+    assert Runner(tmp_path).result(Notes((Note("d"), Note("e")))) == ["MainThread"] * 2
 
 
 def test_every_step_runs_once_after_its_inputs(tmp_path):
