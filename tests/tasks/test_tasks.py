@@ -11,7 +11,7 @@ from planning.scenes import RADIUS, goal_ahead, scene, touching
 from sainet.runs.errors import BadScene
 from sainet.scenes.geometry import rotate
 from sainet.scenes.state import at_rest
-from sainet.tasks.goals import draw_goal
+from sainet.tasks.push_to_goal import draw_goal
 
 
 def naive_cost(task, state, weight):

@@ -41,8 +41,7 @@ from sainet.runs.folders import open_run, remake
 from sainet.scenes.pushes import Push, PushGrid, push_axis
 from sainet.scenes.scene import TIME_STEP
 from sainet.scenes.state import State
-from sainet.tasks.goals import draw_goal
-from sainet.tasks.push_to_goal import PushToGoal
+from sainet.tasks.push_to_goal import PushToGoal, draw_goal
 from sainet.worlds.sampling import scattered
 
 DATASET, RECORDINGS, SUMMARY = "dataset", "recordings", "collected.json"

@@ -12,8 +12,7 @@ from sainet.robots.base import AbstractRobot
 from sainet.robots.simulated import scene_of
 from sainet.scenes.pushes import push_axis
 from sainet.scenes.scene import Scene
-from sainet.tasks.goals import draw_goal
-from sainet.tasks.push_to_goal import PushToGoal
+from sainet.tasks.push_to_goal import PushToGoal, draw_goal
 from sainet.worlds.sampling import scattered
 
 _STARTS = 0x57A2

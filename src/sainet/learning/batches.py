@@ -37,23 +37,14 @@ def mirror(batch: PushBatch, chosen: Bool[Array, " push"]) -> PushBatch:
     def choose(mirrored: Array, values: Array) -> Array:
         return jnp.where(chosen.reshape(-1, *[1] * (values.ndim - 1)), mirrored, values)
 
-    known = batch.initial, batch.controls, batch.truth, batch.measured, batch.simulated
-    mirrored = (
-        batch.initial.mirrored(),
-        batch.controls.mirrored(),
-        *jax.tree.map(flip, known[2:]),
-    )
-    initial, controls, truth, measured, simulated = jax.tree.map(
-        choose, mirrored, known
-    )
-    return replace(
-        batch,
-        initial=initial,
-        controls=controls,
-        truth=truth,
-        measured=measured,
-        simulated=simulated,
-    )
+    arrays = ("truth", "measured", "simulated")
+    mirrored = {name: jax.tree.map(flip, getattr(batch, name)) for name in arrays}
+    mirrored |= {
+        "initial": batch.initial.mirrored(),
+        "controls": batch.controls.mirrored(),
+    }
+    known = {name: getattr(batch, name) for name in mirrored}
+    return replace(batch, **jax.tree.map(choose, mirrored, known))
 
 
 @eqx.filter_jit

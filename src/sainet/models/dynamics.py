@@ -14,6 +14,9 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, unpack_motion
 
+Carry = Any  # what a prediction continues from; each model has a type of its own
+Given = Trajectory | None  # a stored simulator prediction
+
 
 class AbstractDynamics(eqx.Module):
     """Predicts how scenes move; all arguments share one leading axis, push.
@@ -37,17 +40,13 @@ class AbstractDynamics(eqx.Module):
         return None
 
     @abstractmethod
-    def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
+    def begin(self, scene: Scene, state: State) -> Carry:
         """Return the carry of a push that starts at a state."""
 
     @abstractmethod
     def advance(
-        self,
-        scene: Scene,
-        carry: Any,  # noqa: ANN401
-        controls: Controls,
-        simulated: Trajectory | None = None,
-    ) -> tuple[Any, Trajectory]:
+        self, scene: Scene, carry: Carry, controls: Controls, simulated: Given = None
+    ) -> tuple[Carry, Trajectory]:
         """Return the carry and the states after each step of the controls.
 
         Args:
@@ -75,11 +74,7 @@ class PhysicsDynamics(AbstractDynamics):
         return state
 
     def advance(
-        self,
-        scene: Scene,
-        carry: State,
-        controls: Controls,
-        simulated: Trajectory | None = None,
+        self, scene: Scene, carry: State, controls: Controls, simulated: Given = None
     ) -> tuple[State, Trajectory]:
         """Roll the engine out."""
         if simulated is None:
@@ -102,11 +97,7 @@ class LearnedDynamics(AbstractDynamics):
         return Start(state, push_frame(scene, state))
 
     def advance(
-        self,
-        scene: Scene,
-        carry: Start,
-        controls: Controls,
-        simulated: Trajectory | None = None,
+        self, scene: Scene, carry: Start, controls: Controls, simulated: Given = None
     ) -> tuple[Start, Trajectory]:
         """Apply the corrector recurrently."""
         del simulated
@@ -138,11 +129,7 @@ class SimulatorAugmented(AbstractDynamics):
         return Start(state, push_frame(scene, state), state)
 
     def advance(
-        self,
-        scene: Scene,
-        carry: Start,
-        controls: Controls,
-        simulated: Trajectory | None = None,
+        self, scene: Scene, carry: Start, controls: Controls, simulated: Given = None
     ) -> tuple[Start, Trajectory]:
         """Roll the engine out, then correct it step by step."""
         if simulated is None:

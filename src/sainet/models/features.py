@@ -5,7 +5,6 @@ prediction) and what goes beyond them. The order of the blocks is the layout of 
 first layer's weights.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -19,7 +18,7 @@ FEATURES = ("paper", "place")
 
 
 @dataclass(frozen=True)
-class Block(ABC):
+class Block:
     """Features that belong together; a network has them or lacks them as a whole."""
 
     pair_size: ClassVar[int] = 0  # inputs of f_rel
@@ -32,9 +31,10 @@ class Block(ABC):
         del moment, shift
         return ()
 
-    @abstractmethod
     def of_bodies(self, moment: Moment) -> Sequence[Float[Array, "number body push"]]:
         """Return inputs of f_dyn for each body."""
+        del moment
+        return ()
 
 
 @dataclass(frozen=True)
@@ -81,11 +81,6 @@ class RelativeMotion(Block):
         """Return p_i - p_j (m) and v_i - v_j."""
         motion = jnp.concatenate([moment.motion[0:2], moment.motion[3:6]])
         return (motion - jnp.roll(motion, -shift, axis=1),)
-
-    def of_bodies(self, moment: Moment) -> Sequence[Array]:
-        """Return nothing: f_dyn takes the effects of pairs."""
-        del moment
-        return ()
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Wrappers of models: a camera offset, and a restart at every step."""
 
-from typing import Any
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,7 +7,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from sainet.models.correctors import Purpose
-from sainet.models.dynamics import AbstractDynamics
+from sainet.models.dynamics import AbstractDynamics, Carry, Given
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import Controls
 from sainet.scenes.recording import CameraOffset
@@ -37,17 +35,13 @@ class OffsetCamera(AbstractDynamics):
         """The purpose of the network in the wrapped model; None without a network."""
         return self.dynamics.made_for
 
-    def begin(self, scene: Scene, state: State) -> Any:  # noqa: ANN401
+    def begin(self, scene: Scene, state: State) -> Carry:
         """Return the carry of the wrapped model at the state."""
         return self.dynamics.begin(scene, state.with_pusher_moved(self._offset))
 
     def advance(
-        self,
-        scene: Scene,
-        carry: Any,  # noqa: ANN401
-        controls: Controls,
-        simulated: Trajectory | None = None,
-    ) -> tuple[Any, Trajectory]:
+        self, scene: Scene, carry: Carry, controls: Controls, simulated: Given = None
+    ) -> tuple[Carry, Trajectory]:
         """Return the carry and the states after each step of the wrapped model."""
         moved = controls.moved(self._offset)
         carry, trajectory = self.dynamics.advance(scene, carry, moved, simulated)
@@ -82,11 +76,7 @@ class Restarted(AbstractDynamics):
         return state
 
     def advance(
-        self,
-        scene: Scene,
-        carry: State,
-        controls: Controls,
-        simulated: Trajectory | None = None,
+        self, scene: Scene, carry: State, controls: Controls, simulated: Given = None
     ) -> tuple[State, Trajectory]:
         """Apply the model to one step after another; its engine always runs.
 

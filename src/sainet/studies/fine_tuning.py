@@ -1,9 +1,8 @@
 """Settings of fine-tuning on few pushes, compared on surrogate robots."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import msgspec
 import numpy as np
 
 from sainet.datasets.store import Store
@@ -25,7 +24,8 @@ class Way:
     """One way to fine-tune."""
 
     start: str  # `engine`, or a shipped network
-    change: Change = Change()  # to the recipe of such a start
+    # To the recipe of such a start.
+    change: Change = field(default_factory=Change)
 
 
 # The defaults, and other settings, one at a time.
@@ -88,7 +88,7 @@ def _plan(scope: Scope) -> Plan:
                 if count < TRAINING[scale]:
                     pushes = First(pushes, count)
                 recipe = recipe_for(start_named(way.start))
-                recipe = recipe.changed(**msgspec.to_builtins(way.change))
+                recipe = recipe.changed(**way.change)
                 tuned = Train(_TUNED, pushes, scaled(recipe, scale, count))
                 parts.append(
                     Evaluate(
@@ -102,7 +102,7 @@ def _plan(scope: Scope) -> Plan:
 
 
 def _condition(robot: Robot, pushes: int, way: Way) -> Condition:
-    changes = msgspec.to_builtins(way.change).items()
+    changes = way.change.items()
     words = "-".join([way.start, *(f"{key}-{value}" for key, value in changes)])
     return Condition(
         label=f"{robot.name}/{pushes}-pushes/{words}",

@@ -29,21 +29,8 @@ ENGINE_ERRORS = "engine-errors.svg"
 STEPS = "steps"  # folder of the run folders that studies share
 
 
-class Change(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Settings of a recipe that differ from its defaults; None: as in the recipe."""
-
-    features: str | None = None
-    learning_rate: float | None = None
-    iterations: int | None = None
-    halve_every: int | None = None
-    l2: float | None = None
-    linear_from: float | None = None
-    weight_rotation: float | None = None
-    mirror: bool | None = None
-    average: int | None = None
-    hold: int | None = None
-    validation_share: float | None = None
-    patience: int | None = None
+# Settings of a recipe that differ from its defaults, by name.
+Change = dict[str, bool | int | float | str]
 
 
 class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -63,7 +50,7 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         if self.l2 is not None:
             found["l2"] = f"{self.l2:g}"
         if self.start is not None:
-            changes = msgspec.to_builtins(self.change or Change()).items()
+            changes = (self.change or {}).items()
             words = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in changes)
             found["pushes"] = str(self.pushes)
             found["way"] = f"from `{self.start}`, {words or 'the defaults'}"

@@ -1,7 +1,13 @@
-"""The paper's task (section IV-A): push disk 1 until the target disk is at its goal."""
+"""The paper's task (section IV-A): push disk 1 until the target disk is at its goal.
+
+Goals are random: easy goals ahead, hard goals aside.
+"""
+
+from typing import Literal
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from sainet.runs.errors import BadScene
@@ -59,3 +65,39 @@ class PushToGoal(AbstractTask):
 
     def _to_goal(self, place: Float[Array, "*batch 2"]) -> Float[Array, "*batch 2"]:
         return jnp.broadcast_to(self.goal, place.shape) - place
+
+
+GoalKind = Literal["easy", "hard"]
+# Angles from the axis through the disks, to either side (degrees).
+ANGLES: dict[GoalKind, tuple[float, float]] = {
+    "easy": (0.0, 30.0),
+    "hard": (30.0, 60.0),
+}
+DISTANCE_RADII = 3.0
+_STREAM = 0x60A1
+
+
+def draw_goal(
+    kind: GoalKind,
+    seed: int,
+    trial: int,
+    *,
+    disk: np.ndarray,
+    axis: float,
+    radius: float,
+) -> np.ndarray:
+    """Return the position of a goal (m); equal seeds and trials have equal goals.
+
+    Args:
+        kind: easy or hard.
+        seed: common to all trials.
+        trial: index of the trial.
+        disk: centre of the target disk, m.
+        axis: angle of the axis through the disks, rad.
+        radius: radius of the target disk, m.
+    """
+    rng = np.random.default_rng([_STREAM, seed, trial, list(ANGLES).index(kind)])
+    low, high = np.deg2rad(ANGLES[kind])
+    angle = axis + rng.uniform(low, high) * rng.choice([-1, 1])
+    way = np.array([np.cos(angle), np.sin(angle)])
+    return np.asarray(disk) + DISTANCE_RADII * radius * way

@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.random import Generator
 
 from sainet.scenes.controls import Controls, ForceControls, PathControls
 from sainet.scenes.pushes import Push, command_force, command_path
@@ -45,11 +46,7 @@ class AbstractSetup(ABC):
 
     @abstractmethod
     def error(
-        self,
-        controls: Controls,
-        noise: NoiseConfig,
-        rng: np.random.Generator,
-        time_step: float,
+        self, controls: Controls, noise: NoiseConfig, rng: Generator, time_step: float
     ) -> Float[np.ndarray, "push time 2"]:
         """Draw the difference between the executed and the given command (m or N)."""
 
@@ -77,11 +74,7 @@ class RobotSetup(AbstractSetup):
         return command_path(scene, state, push, steps=steps, gap=self._gap)
 
     def error(
-        self,
-        controls: Controls,
-        noise: NoiseConfig,
-        rng: np.random.Generator,
-        time_step: float,
+        self, controls: Controls, noise: NoiseConfig, rng: Generator, time_step: float
     ) -> Float[np.ndarray, "push time 2"]:
         """Draw the tracking error (m), constant while the pusher holds."""
         velocity = np.asarray(controls.action)
@@ -106,11 +99,7 @@ class ForceSetup(AbstractSetup):
         return command_force(scene, state, push, force=force, steps=steps, gap=gap)
 
     def error(
-        self,
-        controls: Controls,
-        noise: NoiseConfig,
-        rng: np.random.Generator,
-        time_step: float,
+        self, controls: Controls, noise: NoiseConfig, rng: Generator, time_step: float
     ) -> Float[np.ndarray, "push time 2"]:
         """Draw the error of the force (N), proportional to its size."""
         return force_error(rng, np.asarray(controls.command), noise, time_step)
