@@ -35,7 +35,7 @@ from sainet.engines.base import roll_out
 from sainet.scenes.controls import Controls, ForceControls, PathControls
 from sainet.scenes.scene import GRAVITY, TIME_STEP, Scene
 from sainet.scenes.shapes import pair_gaps, pusher_gaps
-from sainet.scenes.state import State
+from sainet.scenes.state import State, pack_motion
 
 BATCH = 32  # scenes of each kind
 STEPS = 120
