@@ -67,10 +67,10 @@ lock:  ## Remake both locks, on Python 3.11 (UPGRADE=--upgrade for newer version
 	$(PLAIN_PIP) .venv-lock/bin/pip install -qq $(PIP_TOOLS)
 	$(COMPILE) $(UPGRADE) --output-file requirements.lock pyproject.toml
 	$(COMPILE) $(UPGRADE) --constraint requirements.lock --extra test --extra dev \
-		--output-file requirements-dev.lock pyproject.toml
+		--extra docs --output-file requirements-dev.lock pyproject.toml
 	# Made on Python 3.11, the lock would ask for it on newer ones as well.
-	sed -i 's/^pybullet==\([^ ;]*\) \\/pybullet==\1 ; python_version < "3.12" \\/' \
-		requirements-dev.lock
+	sed -i -e 's/^pybullet==\([^ ;]*\) \\/pybullet==\1 ; python_version < "3.12" \\/' \
+		-e '/^$$/d' requirements-dev.lock
 	rm -rf .venv-lock
 
 lower-bounds:  ## Run the suite with the oldest dependencies that pyproject.toml allows

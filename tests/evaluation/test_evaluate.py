@@ -10,7 +10,7 @@ from msgspec import structs
 from learning.stores import end_points_alone, info_of, made_up, quiet_store, write
 from models.samples import CARD as SAMPLE
 from models.samples import quick_dynamics
-from sainet.datasets.batch import to_batch
+from sainet.datasets.batch import Prediction, to_batch
 from sainet.engines import make_engine, simulator
 from sainet.engines.base import AssumedProperties
 from sainet.engines.simulator import (

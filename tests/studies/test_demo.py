@@ -100,7 +100,8 @@ def test_missing_requirements_are_reported_before_any_run(
 
 
 def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "pybullet", None)
+    for package in ("pybullet", "mujoco"):
+        monkeypatch.setitem(sys.modules, package, None)
     found = json.loads(json.dumps(Reproduce(output=Output(quiet=True)).run()))
     not_run = found["not_run"]
     assert found["studies"].keys() == {"robot-planar", "fine-tuning"}
@@ -111,6 +112,7 @@ def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys
     assert not_run.keys() == set(STUDIES) - {"robot-planar", "fine-tuning"}
     assert not_run["recorded-pushes"].startswith("--recorded is missing: give")
     assert "PyBullet" in not_run["engine-parity"]
+    assert "sainet[mujoco]" in not_run["lab-control"]
 
 
 def test_claims_are_printed_and_in_the_json(monkeypatch, capsys):

@@ -186,10 +186,10 @@ def test_pushes_of_a_cell_are_recorded_in_files(tmp_path, monkeypatch):
         collect(config, out)
     found = read_push(push_file(out, 0))
     assert found.surface == cell.surface
-    assert found.commanded is not None
     radius = [each.radius_mm / 1000 for each in cell.disks]
     assert found.radius == pytest.approx(radius)
     if found.trouble:
         assert not (out / SUMMARY).exists()
     else:
+        assert found.commanded is not None
         assert summary_of(out).usable == 1
