@@ -193,8 +193,16 @@ ROBOTS = (
     "cli/record",
     "robots/__init__",
 )
-ADDED = [p for p in MODULES if p.relative_to(SOURCE).as_posix().startswith(ROBOTS)]
-REBUILT = [path for path in MODULES if path not in ADDED]
+WAY_IN = ("api/", "control/gym", "report/live", "cli/play", "report/pictures")
+
+
+def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
+    """Modules whose paths begin with one of these."""
+    return [p for p in MODULES if p.relative_to(SOURCE).as_posix().startswith(prefixes)]
+
+
+ADDED = modules_of(ROBOTS)
+REBUILT = [path for path in MODULES if path not in ADDED + modules_of(WAY_IN)]
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
     "modules": (lambda: len(REBUILT), 180, 150),
@@ -204,6 +212,11 @@ COUNTS = {
         lambda: sum(map(code_lines, ADDED)),
         3_000,
         3_000,
+    ),
+    "code lines of the way in": (
+        lambda: sum(map(code_lines, modules_of(WAY_IN))),
+        2_500,
+        2_500,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

@@ -1,0 +1,1 @@
+"""The Python interface: short names over the layers below, for scripts."""
