@@ -10,8 +10,10 @@ import pytest
 from rich.console import Console
 
 from report import samples
+from report import test_verdicts as verdicts
 from sainet.evaluation.measurements import Condition
-from sainet.evaluation.summary import Summary
+from sainet.evaluation.summary import Estimate, Summary
+from sainet.evaluation.trials import TrialOutcome
 from sainet.report import WRITERS
 from sainet.report.arrange import arrange
 from sainet.report.writers import (
@@ -232,3 +234,27 @@ def test_a_table_is_written_in_the_format_of_its_file(tmp_path, ending):
     assert "SAIN" in text
     parts = {".md": "| :--", ".html": "<table", ".tex": r"\begin{tabular}"}
     assert parts.get(ending, "Model,n,") in text
+
+
+def test_trials_fit_a_terminal_and_outcomes_in_labs_have_columns():
+    conditions = ("easy", "hard, swapped disks, properties in order")
+    outcome = {
+        "within_2_mm": Estimate(0.4, 0.2, 0.6),
+        "overshoot_mm": Estimate(7.1, -3.7, 22.0),
+        "stuck": Estimate(0.06, -0.04, 0.17),
+    }
+    of_trials = verdicts.summary([], conditions, ("sain",))
+    labs = msgspec.structs.replace(
+        of_trials,
+        outcomes=tuple(
+            TrialOutcome(condition=each, model="sain", values=outcome)
+            for each in conditions
+        ),
+    )
+    text = printed(labs, width=80)
+    assert max(map(len, text.splitlines())) <= 80 and "…" not in text
+    for words in ("within 25 pushes", "7/50", "overshoot (mm)", "6%"):
+        assert words in text
+    assert "0.0–22.0" in markdown(labs) and "0%–17%" in markdown(labs)
+    assert text.count("easy") == 3  # three columns at a time, each with its lines
+    assert "stuck" not in printed(of_trials, width=80)

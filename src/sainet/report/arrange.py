@@ -24,6 +24,12 @@ _TRIAL_HEADINGS = (
     *("solved", "success (95 %)", "pushes (median)"),
     *("within 25 pushes", "within 4 mm", "decision (s)"),
 )
+# Of trials in labs: means with intervals over labs and trials.
+_OUTCOMES = {
+    "within_2_mm": ("within 2 mm", "{:.0%}"),
+    "overshoot_mm": ("overshoot (mm)", "{:.1f}"),
+    "stuck": ("stuck", "{:.0%}"),
+}
 
 
 @dataclass(frozen=True)
@@ -204,10 +210,22 @@ def _is_best(cell: Cell, column: Sequence[Cell], direction: str) -> bool:
 
 def _arrange_trials(summary: Summary) -> Table:
     labels = labels_of([*summary.models, *(p.model for p in summary.published)])
+    outcomes = {(e.condition, e.model): e.values for e in summary.outcomes}
+    shown = _OUTCOMES if outcomes else {}
+    headings = (*_TRIAL_HEADINGS, *(heading for heading, _ in shown.values()))
+
+    def line(row: TrialRow) -> Line:
+        values = outcomes.get((row.condition, row.model), {})
+        cells = (_outcome(values[name], form) for name, (_, form) in shown.items())
+        found = _trial_line(row, labels)
+        return replace(found, cells=(*found.cells, *cells))
+
     return Table(
-        columns=tuple(Column(heading, heading) for heading in _TRIAL_HEADINGS),
-        lines=tuple(_trial_line(row, labels) for row in summary.trials),
-        published=tuple(_published_trials(each, labels) for each in summary.published),
+        columns=tuple(Column(heading, heading) for heading in headings),
+        lines=tuple(map(line, summary.trials)),
+        published=tuple(
+            _published_trials(each, labels, len(headings)) for each in summary.published
+        ),
         sentences=tuple(trial_sentences(summary)),
         verdicts=verdicts_on(summary),
         samples="Trials",
@@ -229,9 +247,19 @@ def _trial_line(row: TrialRow, labels: Mapping[str, str]) -> Line:
     return Line(row.condition, row.model, labels[row.model], cells)
 
 
-def _published_trials(each: PublishedValues, labels: Mapping[str, str]) -> Line:
+def _outcome(estimate: Estimate, form: str) -> Cell:
+    if estimate.value is None:
+        return Cell(DASH)
+    # None is negative; the widened interval of few labs may be.
+    low, high = (form.format(max(x or 0.0, 0.0)) for x in (estimate.low, estimate.high))
+    return Cell(form.format(estimate.value), f"{low}{DASH}{high}")
+
+
+def _published_trials(
+    each: PublishedValues, labels: Mapping[str, str], count: int
+) -> Line:
     trials = each.trials or 0
     solved = f"{round((each.values['success'][0] or 0) * trials)}/{trials}"
-    cells = (Cell(solved), *[Cell(DASH)] * (len(_TRIAL_HEADINGS) - 1))
+    cells = (Cell(solved), *[Cell(DASH)] * (count - 1))
     slug = each.model.slug
     return Line(each.condition, slug, f"{labels[slug]}, published", cells)

@@ -43,9 +43,9 @@ def print_table(table: Table, console: Console) -> None:
 
 def _blocks(table: Table) -> list[Table]:
     """Return parts of a table that a terminal has room for: three columns each."""
-    if not any(column.bodies for column in table.columns):
-        return [table]
     keys = [column.key for column in table.columns]
+    if not any(column.bodies for column in table.columns):
+        return [table.part(keys[i : i + 3]) for i in range(0, len(keys), 3)]
     ends = [key for key in keys if key not in ("trans_percent", "pos_mm", "rot_deg")]
     steps = [key for key in keys if key not in ends]
     return [table.part(part) for part in (steps, ends) if part]
@@ -54,8 +54,10 @@ def _blocks(table: Table) -> list[Table]:
 def _drawn(table: Table, *, is_compact: bool) -> RichTable:
     drawn = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in _leading(table):
-        side = "right" if heading == "n" else "left"
-        drawn.add_column(heading.lower(), justify=side, no_wrap=True)
+        is_count = heading == "n"
+        side = "right" if is_count else "left"
+        wraps = is_compact and heading == table.samples  # a long condition
+        drawn.add_column(heading.lower(), justify=side, no_wrap=not wraps)
     for column in table.columns:
         for heading in _rich_headings(column, is_compact=is_compact):
             drawn.add_column(Text(heading), justify="right", no_wrap=True)
