@@ -193,7 +193,10 @@ ROBOTS = (
     "cli/record",
     "robots/__init__",
 )
-WAY_IN = ("api/", "control/gym", "report/live", "cli/play", "report/pictures")
+WAY_IN = (
+    *("api/", "control/gym", "report/live", "cli/play", "report/pictures"),
+    "report/figures/overview",
+)
 
 
 def modules_of(prefixes: tuple[str, ...]) -> list[Path]:

@@ -82,6 +82,7 @@ class LineLook(TypedDict, total=False):
     dash_capstyle: Literal["butt"]
     marker: str
     markersize: float
+    markerfacecolor: str
 
 
 def line_look(style: ModelStyle, width: float = 1.6) -> LineLook:
