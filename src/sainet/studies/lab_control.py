@@ -34,6 +34,9 @@ ON_PLYWOOD = "hard, plywood"
 SWAPPED = "hard, swapped disks"
 BY_SLOT = "hard, swapped disks, properties in order"
 _FACTORS = ("goals", "planner", "surface", "given_properties")
+# Added after the other conditions were measured: in unsolved trials disk 2 drifted to
+# one side of its goal, which the usual weight corrected too late.
+STEERED = 10.0  # weight of the alignment in the heuristic (m); the usual one is 3
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,8 @@ class Case:
         tuned = lab.trained().tuned(Variant("sain", "tuned"))
         factors = {name: getattr(config, name) for name in _FACTORS}
         factors |= {"world": WORLD, "disks": "swapped" if config.swapped else "usual"}
+        if config.alignment == STEERED:
+            factors["alignment"] = STEERED
         condition = Condition(label=self.label, factors=factors)
         return RunTrials((Load(SAIN, "sain"), tuned), config, condition)
 
@@ -61,11 +66,18 @@ def _case(label: str, **settings: object) -> Case:
     return Case(label, replace(usual, **settings))
 
 
+def _steered(case: Case) -> Case:
+    """Return the same condition with a larger weight of the alignment."""
+    label = f"{case.label}, alignment {STEERED:g}"
+    return Case(label, replace(case.config, alignment=STEERED))
+
+
 def _in_all_labs(*cases: Case) -> Callable[[Scope], Plan]:
-    """Return the plan of some cases in every lab."""
+    """Return the plan of some cases in every lab, with either weight."""
+    every = (*cases, *map(_steered, cases))
 
     def plan(scope: Scope) -> Plan:
-        found = [(lab, case) for lab in labs(scope.scale) for case in cases]
+        found = [(lab, case) for lab in labs(scope.scale) for case in every]
         parts = tuple(case.trials(lab) for lab, case in found)
         return Plan(JoinLabs(parts, tuple(lab.number for lab, _ in found)))
 
