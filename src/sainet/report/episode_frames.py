@@ -98,6 +98,7 @@ def episode_data(record: EpisodeRecord) -> dict[str, object]:
     return {
         "title": episode_title(record),
         "said": outcome(record),
+        "solved": record.solved,
         "timeStep": 1 / FRAMES_PER_SECOND,
         "steps": len(frames.poses) - 1,
         "radius": record.radius_mm,

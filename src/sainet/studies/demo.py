@@ -43,8 +43,8 @@ true properties, uses the true masses and radii, and an assumed friction.
 
 The replay shows the test push on which the engine has its median error. Then \
 the SAIN that ships with the package, trained for all {paper:,}, pushes disk 2 to an \
-easy and to a hard goal by the paper's search; that world is simulated as well, with \
-disks, friction and noise that differ from those of the internal engine."""
+easy and to a hard goal by the paper's search, and so does physics; that world is \
+simulated as well, with disks, friction and noise that differ from those of the internal engine."""
 GOALS: tuple[Goals, ...] = ("easy", "hard")
 
 
@@ -82,27 +82,35 @@ def run_demo(
     summary = summarise(measured)
     measured.write(out / "measurements.nc")
     write_document(out / TABLE, Result(summary=summary))
-    say("4 Pushing disk 2 to an easy and to a hard goal with SAIN.")
-    episodes = [push_to_goal(runner, goals, config) for goals in GOALS]
+    say("4 Pushing disk 2 to an easy and to a hard goal, with SAIN and with physics.")
+    episodes = [
+        push_to_goal(runner, goals, config, model)
+        for goals in GOALS
+        for model in ("sain", "physics")
+    ]
     say("5 Drawing the figures and the report.")
     report = _draw(models, test, measured, config, out)
     report = replace(report, table=summary, episodes=episodes)
     return DemoResult(write_report(report, folder.path / REPORT), summary)
 
 
-def push_to_goal(runner: Runner, goals: Goals, config: DemoConfig) -> EpisodeRecord:
-    """Return the episode of one goal, pushed to with the SAIN that ships.
+def push_to_goal(
+    runner: Runner, goals: Goals, config: DemoConfig, model: str
+) -> EpisodeRecord:
+    """Return the episode of one goal, pushed to with physics or the shipped SAIN.
 
     A network of 300 iterations overshoots the goal, and no push from behind returns
     the disk.
     """
-    settings = ControlConfig(model="sain", goals=goals, trials=1, seed=config.seed)
-    with runner.bar(f"Pushing ({goals})", 1) as bar:
+    settings = ControlConfig(model=model, goals=goals, trials=1, seed=config.seed)
+    with runner.bar(f"Pushing ({goals}, {model})", 1) as bar:
 
         def on_episode(record: EpisodeRecord) -> None:
             bar.add(1, outcome(record))
 
-        return run_trials(settings, runner.out / goals, on_episode=on_episode)[0]
+        return run_trials(
+            settings, runner.out / f"{goals}-{model}", on_episode=on_episode
+        )[0]
 
 
 def _comparison(config: DemoConfig) -> Evaluate:
@@ -144,8 +152,8 @@ def _draw(
             paper=PAPER.optimiser.iterations,
         ),
         figures=(
-            (paths, "The push of the replay: predicted paths against the true one."),
             (errors, "Mean position error of each disk over the time of a push."),
+            (paths, "The push of the replay: predicted paths against the true one."),
         ),
         replays=(replay,),
         manifest=read_json(out / MANIFEST),

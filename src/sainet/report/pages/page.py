@@ -23,6 +23,7 @@ from sainet.runs.errors import BadInput
 
 REPORT = "report.html"
 _SCRIPTS = ("motion.js", "draw.js", "transport.js", "replay.js", "episode.js")
+_CONCLUSIONS = 1  # sentences at the top
 _DECIMALS_MM = 3
 _DECIMALS_RAD = 5
 _PIXELS_PER_POINT = 1.4
@@ -64,13 +65,15 @@ def write_report(report: Report, path: Path) -> Path:
 
 def to_page(report: Report) -> str:
     """Return the report as one HTML page without external references."""
+    table = arrange(report.table) if report.table else None
     return render(
         "report.html.j2",
         report=report,
         paragraphs=[text for text in re.split(r"\n\s*\n", report.summary) if text],
         replays=[replay_data(replay) for replay in report.replays],
         episodes=[episode_data(record) for record in report.episodes],
-        table=Markup(to_html(arrange(report.table))) if report.table else "",
+        conclusions=table.verdicts[:_CONCLUSIONS] if table else (),
+        table=Markup(to_html(table)) if table else "",
         is_of_trials=report.table is not None and report.table.is_of_trials,
         figures=list(_pictures(report.figures)),
         manifest=list(_flatten(report.manifest)),

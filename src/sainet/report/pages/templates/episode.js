@@ -51,7 +51,17 @@ class Episode extends Transport {
     this.drawPlans(context);
     const place = [between(pusher.x, this.step), between(pusher.y, this.step)];
     drawDot(context, this.view.at(...place), pusherRadius * this.view.scale, this.ink);
+    this.drawTolerance(context);
     drawScaleBar(context, this.scene, this.view, this.ink);
+  }
+
+  // The circle that the centre must come into; it thickens at the moment of success.
+  drawTolerance(context) {
+    const { goal, tolerance, moved, solved, steps } = this.data;
+    const isReached = solved && this.step >= steps;
+    strokeWith(context, isReached ? this.colors[moved] : this.ink, isReached ? 3 : 1);
+    circle(context, this.view.at(goal.x, goal.y), tolerance * this.view.scale);
+    context.stroke();
   }
 
   // Where a disk stood at the beginning.
@@ -121,6 +131,10 @@ class Episode extends Transport {
     context.stroke();
     const place = curve[seen - 1];
     drawDot(context, place, 4, this.colors[this.data.moved]);
+    if (!this.data.solved || this.step < this.data.steps) return;
+    strokeWith(context, this.ink, 1.5);
+    circle(context, place, 7);
+    context.stroke();
   }
 
   drawAxes(context, at, last, high) {

@@ -8,7 +8,7 @@ class Player extends Transport {
   prepare() {
     this.truth = this.data.tracks[0];
     this.shown = new Set(this.data.tracks.keys());
-    Object.assign(this, { speed: 0.1, factor: 1 });
+    Object.assign(this, { speed: 0.1, factor: 5 });
     this.lenses = [...this.root.querySelectorAll("[data-view=lens]")];
   }
 

@@ -9,6 +9,7 @@ class Transport {
     Object.assign(this, { step: 0, rest: 0, speed: 1, isPlaying: false, last: null });
     this.scene = this.find("canvas");
     this.prepare();
+    this.step = this.data.steps; // it opens at the end, where there is most to see
     this.listen();
     this.fit();
   }
