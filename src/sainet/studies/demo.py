@@ -44,7 +44,8 @@ true properties, uses the true masses and radii, and an assumed friction.
 The replay shows the test push on which the engine has its median error. Then \
 the SAIN that ships with the package, trained for all {paper:,}, pushes disk 2 to an \
 easy and to a hard goal by the paper's search, and so does physics; that world is \
-simulated as well, with disks, friction and noise that differ from those of the internal engine."""
+simulated as well, with disks, friction and noise that differ from those of the \
+internal engine."""
 GOALS: tuple[Goals, ...] = ("easy", "hard")
 
 

@@ -18,6 +18,7 @@ import jinja2
 from sainet.evaluation.claims import places
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
+from sainet.report.figures.overview import Part, draw_errors_over_physics, draw_success
 from sainet.report.palette import labels_of
 from sainet.report.verdicts import beside_published, rulings, worded_places
 from sainet.report.writers import (
@@ -66,7 +67,9 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "readings": lambda name: readings(summary(name)),
         "trainings": lambda name: trainings(summary(name)),
         "errors": lambda name, *which: errors(summary(name), *which),
-        "solved": lambda *which: solved(summary("simulated-control"), *which),
+        "solved": lambda where, model, study="simulated-control": solved(
+            summary(study), where, model
+        ),
         "identified": lambda: identified(evidence.identifications()),
         "bench": lambda case: bench(evidence.benchmark(case)),
         "figure": lambda case, name: evidence.benchmark(case).figures[name],
@@ -115,10 +118,29 @@ def origin(summary: Summary) -> str:
     return " ".join(part for part in parts if part)
 
 
-def _table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Return a table as Markdown, its first column on the left, others on the right."""
+def findings(evidence: Evidence, titles: Mapping[str, str]) -> str:
+    """Return every claim with its verdict and the page of its study, as a table.
+
+    Args:
+        evidence: of the studies.
+        titles: of pages, by the names of their templates.
+    """
+    rows: list[tuple[str, str, str]] = []
+    for name in STUDIES:
+        claims = load_study(name).claims if name in titles else ()
+        summary = evidence.summary(name) if claims else Summary(models=())
+        for claim in claims:
+            status = claim.rule(summary).status
+            rows.append((claim.text, f"**{status}**", f"[{titles[name]}]({name}.md)"))
+    return _table(("claim", "verdict", "page"), rows, align=":--")
+
+
+def _table(
+    head: Iterable[str], rows: Iterable[Iterable[str]], *, align: str = "--:"
+) -> str:
+    """Return a table as Markdown, its first column on the left."""
     head = list(head)
-    lines = (head, (":--", *["--:"] * (len(head) - 1)), *rows)
+    lines = (head, (":--", *[align] * (len(head) - 1)), *rows)
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
@@ -197,7 +219,8 @@ def rendered(root: Path) -> dict[Path, str]:
         lstrip_blocks=True,
         autoescape=False,  # noqa: S701  (Markdown from our own templates)
     )
-    environment.globals.update(cast(Any, helpers(Evidence(root))))
+    evidence = Evidence(root)
+    environment.globals.update(cast(Any, helpers(evidence)))
     pages = {
         path.stem: _page(environment.get_template(path.name))
         for path in sorted(templates.glob("*.md.j2"))
@@ -205,7 +228,9 @@ def rendered(root: Path) -> dict[Path, str]:
     }
     block = pages.pop(_README)
     titles = {name: page.title for name, page in pages.items()}
-    pages[_INDEX] = _page(environment.get_template(f"{_INDEX}.j2"), titles=titles)
+    table = findings(evidence, {Path(k).stem: v for k, v in titles.items()})
+    index = environment.get_template(f"{_INDEX}.j2")
+    pages[_INDEX] = _page(index, titles=titles, findings=table)
     readme = root / "README.md"
     return {root / PAGES / name: page.text for name, page in pages.items()} | {
         readme: with_block(readme.read_text("utf-8"), block.text)
@@ -230,13 +255,39 @@ def with_block(text: str, block: str) -> str:
     return before + begin + block + end + after
 
 
+# Conditions of the overviews: title, study, label.
+_ERRORS_OF = (
+    ("Table I: a force, two disks", "direct-force-two-disks", ""),
+    ("Table II: three disks", "direct-force-three-disks", ""),
+    ("Table III: the robot, two disks", "robot-two-disks", ""),
+    ("Table IV, in the virtual lab", "lab-prediction", "tests on ABS"),
+)
+_SUCCESS_OF = (
+    ("Simulation, easy goals", "simulated-control", "easy, greedy"),
+    ("Simulation, hard goals", "simulated-control", "hard, greedy"),
+    (
+        "Simulation, three disks, easy goals",
+        "simulated-control",
+        "easy, tree, three disks",
+    ),
+    ("Virtual lab, easy goals", "lab-control", "easy"),
+    ("Virtual lab, hard goals", "lab-control", "hard"),
+)
+
+
 def draw_figures(root: Path) -> None:
-    """Draw the figures of studies from their measurements."""
-    evidence = Evidence(root)
+    """Draw the overviews, and the figures of studies, from their measurements."""
+    evidence, figures = Evidence(root), root / FIGURES
+
+    def parts(of: Iterable[tuple[str, str, str]]) -> list[Part]:
+        return [Part(title, evidence.summary(name), label) for title, name, label in of]
+
+    draw_errors_over_physics(parts(_ERRORS_OF), figures / "errors-over-physics.svg")
+    draw_success(parts(_SUCCESS_OF), figures / "goals-solved.svg")
     for name in STUDIES:
         study = load_study(name)
         if study.figure is not None:
-            study.figure(evidence.summary(name), root / FIGURES / study.figure_name)
+            study.figure(evidence.summary(name), figures / study.figure_name)
 
 
 def main() -> None:
