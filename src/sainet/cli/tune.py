@@ -7,12 +7,7 @@ from tyro.conf import Positional
 
 from sainet.cli.output import Json, Output
 from sainet.cli.train import Job
-from sainet.learning.recipes import (
-    FROM_ENGINE,
-    RESIDUAL,
-    recipe_for,
-    start_named,
-)
+from sainet.learning.recipes import FROM_ENGINE, RESIDUAL, recipe_for, start_named
 from sainet.models.identity import Features, ModelKind
 
 

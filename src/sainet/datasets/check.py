@@ -147,10 +147,7 @@ def _array_metadata(info: StoreInfo, variable: Variable) -> dict[str, object]:
         "shape": variable.shape(info),
         "data_type": np.dtype(variable.dtype).name,
         "chunk_grid": {"name": "regular", "configuration": chunks},
-        "chunk_key_encoding": {
-            "name": "default",
-            "configuration": {"separator": "/"},
-        },
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
         "fill_value": "NaN" if variable.dtype is np.float32 else 0,
         "codecs": (
             {"name": "bytes", "configuration": {"endian": "little"}},

@@ -155,12 +155,7 @@ def _is_same(
 
 
 def write_split(
-    store: Store,
-    out: Path,
-    *,
-    test: float = 0.2,
-    seed: int = 0,
-    chains: bool = False,
+    store: Store, out: Path, *, test: float = 0.2, seed: int = 0, chains: bool = False
 ) -> tuple[Store, Store]:
     """Write the training and the test part as datasets, once.
 

@@ -157,9 +157,7 @@ def _as_recorded(
     return known | {simulated_name(_ENGINE): motion}
 
 
-def _at_all_steps(
-    off: Float[np.ndarray, "push 3"],
-) -> Float[np.ndarray, "push 1 1 3"]:
+def _at_all_steps(off: Float[np.ndarray, "push 3"]) -> Float[np.ndarray, "push 1 1 3"]:
     """Return deviations that apply to every pose; only the last one is observed."""
     return off[:, None, None].astype(np.float32)
 

@@ -184,9 +184,7 @@ def trial_differences(measured: Measurements) -> Iterator[TrialDifference]:
                 )
 
 
-def _in_labs(
-    measured: Measurements,
-) -> Iterator[tuple[Condition, dict[str, Sample]]]:
+def _in_labs(measured: Measurements) -> Iterator[tuple[Condition, dict[str, Sample]]]:
     """Yield the outcomes of every model by condition, if they are of labs."""
     for condition in measured.header.conditions if measured.header.has_labs else ():
         part = measured.samples_of(condition)

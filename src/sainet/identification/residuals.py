@@ -115,10 +115,7 @@ def residuals(
 
 
 def slopes(
-    coordinates: Mapping[str, float],
-    free: Sequence[str],
-    scale: Scale,
-    sample: Sample,
+    coordinates: Mapping[str, float], free: Sequence[str], scale: Scale, sample: Sample
 ) -> Float[np.ndarray, "push number parameter"]:
     """Return forward-mode derivatives of the scaled errors by the free parameters."""
     found = _slope(*_arguments(coordinates, free, scale, sample))
@@ -126,10 +123,7 @@ def slopes(
 
 
 def _arguments(
-    coordinates: Mapping[str, float],
-    free: Sequence[str],
-    scale: Scale,
-    sample: Sample,
+    coordinates: Mapping[str, float], free: Sequence[str], scale: Scale, sample: Sample
 ) -> tuple[Values, Values, Array, PushBatch, Array]:
     tree = {name: jnp.float32(value) for name, value in coordinates.items()}
     chosen = {name: tree.pop(name) for name in free}

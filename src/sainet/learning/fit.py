@@ -16,12 +16,7 @@ from sainet.datasets.store import Store
 from sainet.learning.checks import check_task
 from sainet.learning.log import LogLine, append_log, read_log, rewind_log
 from sainet.learning.loss import LossWeights
-from sainet.learning.recipes import (
-    FROM_ENGINE,
-    FromModel,
-    Recipe,
-    Start,
-)
+from sainet.learning.recipes import FROM_ENGINE, FromModel, Recipe, Start
 from sainet.learning.step import (
     Best,
     FitState,

@@ -16,12 +16,7 @@ from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
 from sainet.learning.batches import mirror_some, to_single_steps
 from sainet.learning.loss import LossWeights, feature_scales, loss_weights
-from sainet.learning.recipes import (
-    FROM_ENGINE,
-    FromSimulator,
-    Recipe,
-    SingleSteps,
-)
+from sainet.learning.recipes import FROM_ENGINE, FromSimulator, Recipe, SingleSteps
 from sainet.learning.step import FitState, first_state
 from sainet.models.card import Card
 from sainet.models.checkpoint import untrained

@@ -102,10 +102,7 @@ def untrained(
 
     def make() -> InteractionNetwork:
         return InteractionNetwork(
-            features,
-            time_step=time_step,
-            key=jax.random.key(0),
-            integrator=integrator,
+            features, time_step=time_step, key=jax.random.key(0), integrator=integrator
         )
 
     return eqx.filter_eval_shape(make)

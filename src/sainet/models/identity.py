@@ -4,11 +4,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from sainet.engines.simulator import (
-    PAPER,
-    TRUE_PROPERTIES,
-    SimulatorSpec,
-)
+from sainet.engines.simulator import PAPER, TRUE_PROPERTIES, SimulatorSpec
 
 Kind = Literal["physics", "in", "sain", "gp", "published"]
 # Pushes that a network was trained on: the paper's simulated pushes; simulated strokes;
@@ -77,8 +73,4 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
         return _ENGINE_LABELS.get(part, f" around {part.capitalize()}")
 
 
-_ENGINE_LABELS = {
-    "": "",
-    "true": ", true properties",
-    "identified": ", identified",
-}
+_ENGINE_LABELS = {"": "", "true": ", true properties", "identified": ", identified"}

@@ -103,10 +103,7 @@ class Model:
 
 
 # What the engine of each physics model assumes; it may be any engine of `SIMULATORS`.
-PHYSICS: Mapping[str, Assumptions] = {
-    "physics": PAPER,
-    "physics-true": TRUE_PROPERTIES,
-}
+PHYSICS: Mapping[str, Assumptions] = {"physics": PAPER, "physics-true": TRUE_PROPERTIES}
 PRETRAINED = Path(__file__).parent / "pretrained"
 OF_PAPER = ("in", "sain", "sain-bullet")
 OF_STROKES = ("in-stroke", "sain-stroke")  # of one disk, as recorded on a robot

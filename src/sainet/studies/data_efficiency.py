@@ -25,8 +25,7 @@ AGAIN_CONDITION = Condition(
     factors={"training_pushes": AGAIN, "seeds": "other"},
 )
 IN_FULL = Condition(
-    label="all, trained in full",
-    factors={"training_pushes": 4500, "iterations": "all"},
+    label="all, trained in full", factors={"training_pushes": 4500, "iterations": "all"}
 )
 _SHORTER = 4
 RECORDED_COUNTS = {"quick": (10, 20), "paper": (25, 50, 100, 200, 400)}

@@ -174,11 +174,7 @@ def readings(summary: Summary) -> str:
         for model in sains:
             for against in ("physics-true", "in"):
                 found = places(
-                    summary,
-                    model,
-                    against,
-                    metrics=_ERRORS,
-                    condition=condition.label,
+                    summary, model, against, metrics=_ERRORS, condition=condition.label
                 )
                 lines.append(f"- {where}{worded_places(found, summary)}")
     return "\n".join(lines)

@@ -8,12 +8,7 @@ from jaxtyping import Int
 
 from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS, Assumptions, PlanarSpec
-from sainet.learning.recipes import (
-    FINE_TUNING,
-    RESIDUAL,
-    Fresh,
-    FromModel,
-)
+from sainet.learning.recipes import FINE_TUNING, RESIDUAL, Fresh, FromModel
 from sainet.models.card import read_identified
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented

@@ -14,11 +14,7 @@ from sainet.control.config import ControlConfig
 from sainet.control.record import EpisodeRecord
 from sainet.control.trials import measure_trials, run_trials
 from sainet.evaluation.claims import Claim, solves_more
-from sainet.evaluation.measurements import (
-    Condition,
-    Measurements,
-    PublishedValues,
-)
+from sainet.evaluation.measurements import Condition, Measurements, PublishedValues
 from sainet.models.identity import ModelId
 from sainet.models.library import Model
 from sainet.studies.paper_setup import IN, SAIN, physics
@@ -104,10 +100,7 @@ def published_success(
 ) -> PublishedValues:
     """Return the published share of solved trials of one model."""
     return PublishedValues(
-        condition=condition,
-        model=model,
-        values={"success": (success,)},
-        trials=25,
+        condition=condition, model=model, values={"success": (success,)}, trials=25
     )
 
 

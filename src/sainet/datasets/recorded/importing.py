@@ -10,12 +10,7 @@ from jaxtyping import Float, Int
 from sainet.datasets.batch import simulate
 from sainet.datasets.recorded.properties import Properties
 from sainet.datasets.recorded.resample import ResampledPush
-from sainet.datasets.schema import (
-    Arrays,
-    StoreInfo,
-    published_name,
-    simulated_name,
-)
+from sainet.datasets.schema import Arrays, StoreInfo, published_name, simulated_name
 from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import write_once
 from sainet.engines import RECORDED

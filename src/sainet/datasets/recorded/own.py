@@ -43,11 +43,7 @@ COLUMNS = Columns(
 
 
 def import_table(
-    path: Path,
-    properties: Path,
-    out: Path,
-    *,
-    contact_friction: float | None = None,
+    path: Path, properties: Path, out: Path, *, contact_friction: float | None = None
 ) -> Store:
     """Make a store of a table with one row for each push, time and body.
 

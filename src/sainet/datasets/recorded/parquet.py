@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.recorded.tables import (
-    MOST_ROWS,
-    Columns,
-    Problems,
-    Table,
-    Texts,
-)
+from sainet.datasets.recorded.tables import MOST_ROWS, Columns, Problems, Table, Texts
 from sainet.runs.errors import BadTable, MissingExtra
 
 

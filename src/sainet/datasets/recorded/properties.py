@@ -11,13 +11,7 @@ from sainet.datasets.recorded.tables import SHOWN, Problems
 from sainet.datasets.schema import Arrays
 from sainet.runs.documents import read_file
 from sainet.runs.errors import BadTable
-from sainet.scenes.quantities import (
-    FRICTION,
-    MASS,
-    PUSHER_RADIUS,
-    RADIUS,
-    Quantity,
-)
+from sainet.scenes.quantities import FRICTION, MASS, PUSHER_RADIUS, RADIUS, Quantity
 
 CONTACT_FRICTION = 0.25
 TABLE_FRICTION = 0.15  # the paper's; a quasi-static path hardly depends on it

@@ -108,9 +108,7 @@ class MotionFile:
         return self.file.name.rpartition(".")[0]
 
 
-def choose(
-    files: Sequence[ArchivedFile],
-) -> tuple[list[MotionFile], Counter[str]]:
+def choose(files: Sequence[ArchivedFile]) -> tuple[list[MotionFile], Counter[str]]:
     """Return the pushes that can be modelled, by name, and counts of the others."""
     skipped: Counter[str] = Counter()
     chosen: dict[str, MotionFile] = {}

@@ -137,9 +137,7 @@ def _integrate(bodies: Bodies, twists: tuple[Twist, ...], time_step: float) -> B
 
 def _time_after_batch(states: State, batch_axes: int) -> State:
     """Return states with the time axis of a scan behind the batch axes."""
-    return State(
-        *(jnp.moveaxis(part, 0, batch_axes) for part in _leaves(states)),
-    )
+    return State(*(jnp.moveaxis(part, 0, batch_axes) for part in _leaves(states)))
 
 
 def _leaves(states: State) -> tuple[Array, ...]:

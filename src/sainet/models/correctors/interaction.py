@@ -12,12 +12,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from sainet.models.correctors import (
-    AbstractCorrector,
-    Prediction,
-    Purpose,
-    Start,
-)
+from sainet.models.correctors import AbstractCorrector, Prediction, Purpose, Start
 from sainet.models.features import FeatureSet
 from sainet.models.inputs import (
     Drive,

@@ -42,10 +42,7 @@ _LOOK: dict[Any, Any] = {
     "ytick.labelsize": 8,
     "ytick.major.width": 0.6,
 }
-_METADATA = {
-    ".svg": {"Date": None, "Creator": None},
-    ".png": {"Software": None},
-}
+_METADATA = {".svg": {"Date": None, "Creator": None}, ".png": {"Software": None}}
 DOTS_PER_INCH = 200
 _LABEL_HEIGHT = 12.5  # points
 _PIECE = (7, 27)  # points right of the axes: of the line, before its label
@@ -100,9 +97,7 @@ def add_grid(axes: Axes, axis: str = "y") -> None:
 
 
 def label_ends(
-    axes: Axes,
-    styles: Sequence[ModelStyle],
-    ends: Sequence[tuple[float, float]],
+    axes: Axes, styles: Sequence[ModelStyle], ends: Sequence[tuple[float, float]]
 ) -> None:
     """Write each model's label next to the end of its line, without overlaps.
 

@@ -15,11 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from sainet.control.record import EpisodeRecord
-from sainet.report.episode_frames import (
-    FRAMES_PER_SECOND,
-    EpisodeFrames,
-    episode_title,
-)
+from sainet.report.episode_frames import FRAMES_PER_SECOND, EpisodeFrames, episode_title
 from sainet.report.figures.canvas import add_grid, house_look, new_figure
 from sainet.report.figures.episodes import body_color
 from sainet.report.palette import INK, TARGET

@@ -127,9 +127,7 @@ def _numbers(values: np.ndarray, decimals: int) -> list[float | None]:
     return [value if np.isfinite(value) else None for value in rounded.tolist()]
 
 
-def _pictures(
-    figures: Sequence[tuple[Path | str, str]],
-) -> Iterator[dict[str, str]]:
+def _pictures(figures: Sequence[tuple[Path | str, str]]) -> Iterator[dict[str, str]]:
     for number, (source, caption) in enumerate(figures, start=1):
         if isinstance(source, str):
             picture = inline_svg(source, number)
