@@ -20,13 +20,7 @@ from sainet.datasets.schema import (
     variables,
 )
 from sainet.datasets.store import Store, open_store
-from sainet.runs.documents import (
-    checked,
-    content_hash,
-    read_document,
-    write_document,
-    write_error,
-)
+from sainet.runs import documents
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
@@ -125,11 +119,11 @@ def _write(
         on_pushes(info.chunk_length(index))
     hashes: Hashes = {}
     for index in range(info.chunks):
-        hashes |= read_document(_receipt(folder, index), Listing).files
+        hashes |= documents.read_document(_receipt(folder, index), Listing).files
     for path in sorted((folder / ARRAYS).rglob("zarr.json")):
         name = path.relative_to(folder / ARRAYS).as_posix()
-        hashes[name] = content_hash(path.read_bytes())
-    write_document(folder / HASHES, Listing(files=hashes))
+        hashes[name] = documents.content_hash(path.read_bytes())
+    documents.write_document(folder / HASHES, Listing(files=hashes))
     _clear_progress(folder)
 
 
@@ -138,7 +132,7 @@ def _create_arrays(folder: Path, info: StoreInfo) -> None:
     import zarr
     from zarr.codecs import ZstdCodec
 
-    attributes = msgspec.to_builtins(checked(info, folder))
+    attributes = msgspec.to_builtins(documents.checked(info, folder))
     try:
         group = zarr.open_group(folder / ARRAYS, mode="a", attributes=None)
         group.attrs.put(attributes)
@@ -157,7 +151,7 @@ def _create_arrays(folder: Path, info: StoreInfo) -> None:
                 config={"write_empty_chunks": True},
             )
     except OSError as error:
-        raise write_error(folder / ARRAYS, error) from error
+        raise documents.write_error(folder / ARRAYS, error) from error
 
 
 def write_chunk(
@@ -174,12 +168,12 @@ def write_chunk(
                 value = np.asarray(arrays[name], variable.dtype)
                 group[name][info.chunk_slice(index)] = value  # pyright: ignore
     except OSError as error:
-        raise write_error(folder / ARRAYS, error) from error
+        raise documents.write_error(folder / ARRAYS, error) from error
     hashes = {
-        name: content_hash((folder / ARRAYS / name).read_bytes())
+        name: documents.content_hash((folder / ARRAYS / name).read_bytes())
         for name in chunk_files(info, index)
     }
-    write_document(_receipt(folder, index), Listing(files=hashes))
+    documents.write_document(_receipt(folder, index), Listing(files=hashes))
     return index
 
 
@@ -201,12 +195,13 @@ def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
 
 def _is_written(folder: Path, info: StoreInfo, index: int) -> bool:
     try:
-        receipt = read_document(_receipt(folder, index), Listing).files
+        receipt = documents.read_document(_receipt(folder, index), Listing).files
     except BadInput:
         return False
     paths = {name: folder / ARRAYS / name for name in chunk_files(info, index)}
     return all(
-        path.is_file() and content_hash(path.read_bytes()) == receipt.get(name)
+        path.is_file()
+        and documents.content_hash(path.read_bytes()) == receipt.get(name)
         for name, path in paths.items()
     )
 

@@ -29,16 +29,9 @@ from sainet.models.dynamics import (
 )
 from sainet.models.identity import ModelId
 from sainet.models.wrappers import Restarted, with_camera
+from sainet.runs import errors
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.documents import content_hash, read_file
-from sainet.runs.errors import (
-    BadCheckpoint,
-    BadInput,
-    UnknownName,
-    hint,
-    shown,
-    unknown_name,
-)
 
 _SAME_TIME = 1e-9  # s
 
@@ -79,24 +72,24 @@ class Model:
             return
         path = f"{self.folder}/{CARD}"
         if self.card.kind != kind:
-            raise BadCheckpoint(
+            raise errors.BadCheckpoint(
                 f"{path}: kind is {self.card.kind!r}, the data's is "
                 f"{kind!r}; train a network on such pushes, or give `force`."
             )
         if abs(self.card.time_step - time_step) > _SAME_TIME:
-            raise BadCheckpoint(
+            raise errors.BadCheckpoint(
                 f"{path}: time_step is {self.card.time_step} s, the data's is "
                 f"{time_step} s; train a network on such data, or give `force`."
             )
         if seed is not None and seed in self.card.data_seeds:
-            raise BadCheckpoint(
+            raise errors.BadCheckpoint(
                 f"{path}: data_seeds has {seed}, the seed of the data: the network may "
                 "have been trained on these very pushes. Generate others with another "
                 "`seed`, or give `force`."
             )
         seen = 0 if pushes is None else pushes_overlap(self.card.pushes, pushes)
         if pushes is not None and seen:
-            raise BadCheckpoint(
+            raise errors.BadCheckpoint(
                 f"{path}: the network was trained on {seen} of these {len(pushes)} "
                 "pushes. Test it on others ('sainet split'), or give `force`."
             )
@@ -201,7 +194,7 @@ def physics_simulator(name: str, engine: str) -> SimulatorSpec:
     assumed, each = PHYSICS[name], SIMULATORS.values()
     known = {spec.engine: spec for spec in each if spec.assumptions == assumed}
     if engine not in known:
-        raise unknown_name("engine", engine, known)
+        raise errors.unknown_name("engine", engine, known)
     return known[engine]
 
 
@@ -225,7 +218,7 @@ def _identified_physics(
     folder: Path, engine: str | None, order: Sequence[int] | None
 ) -> Model:
     if engine not in (None, PlanarSpec.engine):
-        raise BadInput(
+        raise errors.BadInput(
             f"{folder / IDENTIFIED}: its parameters are those of the planar engine, "
             f"not of {engine}; leave `engine` out."
         )
@@ -247,9 +240,9 @@ def network_folder(name: str) -> Path:
     """
     folder = PRETRAINED / name if name in SHIPPED else Path(name)
     if name in PHYSICS or not folder.exists():
-        raise UnknownName(
-            f"No model named '{shown(name)}'{hint(name, MODELS)}. Available: "
-            f"{', '.join(MODELS)}, or the folder of a trained network."
+        raise errors.UnknownName(
+            f"No model named '{errors.shown(name)}'{errors.hint(name, MODELS)}. "
+            f"Available: {', '.join(MODELS)}, or the folder of a trained network."
         )
     return folder
 
@@ -261,7 +254,7 @@ def _internal(
     if engine is None or engine == own.engine:
         return own
     if not force:
-        raise BadCheckpoint(
+        raise errors.BadCheckpoint(
             f"{folder / CARD}: its internal engine is {own.engine!r}, not {engine!r}; "
             "leave `engine` out, train a network around that engine, or give `force`."
         )
@@ -271,7 +264,7 @@ def _internal(
 
 def _restarted(folder: Path, dynamics: AbstractDynamics) -> AbstractDynamics:
     if dynamics.on_host:
-        raise BadCheckpoint(
+        raise errors.BadCheckpoint(
             f"{folder / CARD}: recipe.horizon is single-steps, and the engine cannot "
             "restart at every step; give `engine` planar, or train it on whole pushes."
         )

@@ -8,15 +8,7 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary, finalize
 
-from sainet.runs.documents import (
-    read_document,
-    read_json,
-    readable,
-    to_json,
-    write_document,
-    write_error,
-    write_json,
-)
+from sainet.runs import documents
 from sainet.runs.errors import RunConflict, shown
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
 
@@ -99,9 +91,9 @@ def open_run(
         RunConflict: the folder belongs to another run, or another process uses it;
             nothing was changed.
     """
-    wanted = json.loads(to_json(dict(config)))
+    wanted = json.loads(documents.to_json(dict(config)))
     folder = RunFolder(path, finished_by)
-    with readable(path, RunConflict):
+    with documents.readable(path, RunConflict):
         _check_free(path, wanted)
     try:
         folder = replace(folder, lock=_lock(path))
@@ -113,9 +105,9 @@ def open_run(
         if not leftover.is_dir():
             leftover.unlink(missing_ok=True)
     if not (path / MANIFEST).exists():
-        write_document(path / MANIFEST, manifest(devices))
+        documents.write_document(path / MANIFEST, manifest(devices))
     if not (path / CONFIG).exists():
-        write_json(path / CONFIG, wanted)
+        documents.write_json(path / CONFIG, wanted)
     return folder
 
 
@@ -130,7 +122,7 @@ def _lock(path: Path) -> FolderLock | None:
             "choose another `out`."
         ) from None
     except OSError as error:
-        raise write_error(path, error) from error
+        raise documents.write_error(path, error) from error
 
 
 def remake(path: Path) -> str:
@@ -144,9 +136,11 @@ def _check_free(path: Path, wanted: dict[str, Any]) -> None:
         raise RunConflict(f"{path}: is a file; choose a folder as `out`.")
     if (path / MANIFEST).exists():
         remedy = remake(path)
-        read_document(path / MANIFEST, Manifest, error=RunConflict, remedy=remedy)
+        documents.read_document(
+            path / MANIFEST, Manifest, error=RunConflict, remedy=remedy
+        )
     if (path / CONFIG).exists():
-        _check_same(path, read_json(path / CONFIG, RunConflict), wanted)
+        _check_same(path, documents.read_json(path / CONFIG, RunConflict), wanted)
     elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
         raise RunConflict(f"{path}: not a sainet run folder; choose an empty folder.")
 

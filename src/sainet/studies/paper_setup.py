@@ -12,16 +12,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import FINE_TUNING, PAPER, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.library import PHYSICS, physics_simulator
-from sainet.studies import Scale
-from sainet.studies.steps import (
-    Evaluate,
-    First,
-    Load,
-    Simulate,
-    Step,
-    Train,
-    WithBystander,
-)
+from sainet.studies import Scale, steps
 from sainet.worlds.config import SetupName
 
 IN = ModelId(kind="in")
@@ -64,7 +55,7 @@ class PaperSetup:
         """The paper's recipe, with the iterations of the scale."""
         return PAPER.changed(iterations=self.sizes.iterations)
 
-    def training_pushes(self) -> Simulate:
+    def training_pushes(self) -> steps.Simulate:
         """Return the training pushes, with the predictions of every internal engine."""
         names = ("bullet", "planar", "planar-true")
         config = GenerateConfig(pushes=self.sizes.pushes, assumed_engine=names)
@@ -72,13 +63,13 @@ class PaperSetup:
 
     def test_pushes(
         self, label: str = "test", config: GenerateConfig | None = None
-    ) -> Simulate:
+    ) -> steps.Simulate:
         """Return the test pushes, or as many others with some other settings."""
         config = config or GenerateConfig()
         config = replace(config, pushes=self.sizes.tests, seed=_TEST_SEED)
         return self._simulate(label, config)
 
-    def validation_pushes(self) -> Simulate:
+    def validation_pushes(self) -> steps.Simulate:
         """Return pushes to choose settings by: neither trained nor tested on."""
         config = GenerateConfig(pushes=self.sizes.tests, seed=_VALIDATION_SEED)
         return self._simulate("validation", config)
@@ -90,7 +81,7 @@ class PaperSetup:
         recipe: Recipe | None = None,
         *,
         pushes: int | None = None,
-    ) -> tuple[Train, ...]:
+    ) -> tuple[steps.Train, ...]:
         """Return a training run of each network from each seed.
 
         Args:
@@ -100,30 +91,30 @@ class PaperSetup:
             pushes: number of training pushes; None: all.
         """
         count, data = self.sizes.pushes, self.training_pushes()
-        chosen: Step[Store] = data
+        chosen: steps.Step[Store] = data
         if pushes not in (None, count):
-            count, chosen = pushes, First(data, pushes)
+            count, chosen = pushes, steps.First(data, pushes)
         recipe = recipe or self.recipe
         batch = min(recipe.optimiser.batch_size, count)
         return tuple(
-            Train(network, chosen, recipe.changed(batch_size=batch, seed=seed))
+            steps.Train(network, chosen, recipe.changed(batch_size=batch, seed=seed))
             for network in networks
             for seed in seeds
         )
 
     def train_beside_bystander(
         self, networks: Sequence[ModelId], seeds: Sequence[int]
-    ) -> tuple[Train, ...]:
+    ) -> tuple[steps.Train, ...]:
         """Return networks that are fine-tuned beside a disk that nothing touches.
 
         By the recipe of fine-tuning any network, but for the steps, which are those of
         the network's own training.
         """
-        pushes = WithBystander(self.training_pushes())
+        pushes = steps.WithBystander(self.training_pushes())
         recipe = FINE_TUNING.changed(steps=PAPER.horizon.steps)
         recipe = scaled(recipe, self.scale, self.sizes.pushes)
         return tuple(
-            Train(
+            steps.Train(
                 structs.replace(start.id, variant="bystander"),
                 pushes,
                 recipe.changed(seed=start.recipe.seed),
@@ -134,27 +125,27 @@ class PaperSetup:
 
     def compare(
         self,
-        networks: Sequence[Train],
-        tests: Step[Store],
+        networks: Sequence[steps.Train],
+        tests: steps.Step[Store],
         condition: Condition | None = None,
-    ) -> Evaluate:
+    ) -> steps.Evaluate:
         """Return the errors of physics (Bullet) and networks."""
-        return Evaluate((*physics("bullet"), *networks), tests, condition)
+        return steps.Evaluate((*physics("bullet"), *networks), tests, condition)
 
-    def _simulate(self, label: str, config: GenerateConfig) -> Simulate:
+    def _simulate(self, label: str, config: GenerateConfig) -> steps.Simulate:
         whole = replace(
             config,
             setup=self.setup,
             engine="bullet",
             chunk_size=min(_CHUNK, config.pushes),  # whole chunks are simulated
         )
-        return Simulate(f"{self.setup}-{label}", whole)
+        return steps.Simulate(f"{self.setup}-{label}", whole)
 
 
-def physics(engine: str = "planar") -> tuple[Load, ...]:
+def physics(engine: str = "planar") -> tuple[steps.Load, ...]:
     """Return both physics models: assumed properties, and true masses and radii."""
     return tuple(
-        Load(
+        steps.Load(
             ModelId(kind="physics", simulator=physics_simulator(name, engine)),
             name,
             engine,

@@ -4,20 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 from sainet.runs.errors import require, require_one_of
-from sainet.scenes.quantities import (
-    FRICTION,
-    GAP,
-    MASS,
-    MOST_DISKS,
-    MOST_STEPS,
-    PUSHER_RADIUS,
-    PUSHING_FORCE,
-    RADIUS,
-    SPEED,
-    STROKE,
-    Quantity,
-    require_count,
-)
+from sainet.scenes import quantities
 from sainet.worlds.noise import NoiseConfig, NoiseLevel
 
 SetupName = Literal["robot", "direct-force"]
@@ -25,22 +12,22 @@ Range = tuple[float] | tuple[float, float]
 _RIGHT_ANGLE = 90  # degrees
 
 _COUNTS = {
-    "disks": (1, MOST_DISKS),
-    "force_steps": (1, MOST_STEPS),
-    "hold_steps": (0, MOST_STEPS),
+    "disks": (1, quantities.MOST_DISKS),
+    "force_steps": (1, quantities.MOST_STEPS),
+    "hold_steps": (0, quantities.MOST_STEPS),
 }
 _RANGES = {
-    "mass_kg": MASS,
-    "radius_mm": RADIUS.times(1000, "mm"),
-    "stroke_mm": STROKE.times(1000, "mm"),
-    "speed_mm_s": SPEED.times(1000, "mm/s"),
-    "table_friction": FRICTION,
-    "contact_friction": FRICTION,
+    "mass_kg": quantities.MASS,
+    "radius_mm": quantities.RADIUS.times(1000, "mm"),
+    "stroke_mm": quantities.STROKE.times(1000, "mm"),
+    "speed_mm_s": quantities.SPEED.times(1000, "mm/s"),
+    "table_friction": quantities.FRICTION,
+    "contact_friction": quantities.FRICTION,
 }
 _QUANTITIES = {
-    "pusher_radius_mm": PUSHER_RADIUS.times(1000, "mm"),
-    "force_n": PUSHING_FORCE,
-    "gap_mm": GAP.times(1000, "mm"),
+    "pusher_radius_mm": quantities.PUSHER_RADIUS.times(1000, "mm"),
+    "force_n": quantities.PUSHING_FORCE,
+    "gap_mm": quantities.GAP.times(1000, "mm"),
 }
 
 
@@ -96,7 +83,7 @@ class WorldConfig:
         """
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
         for name, (low, high) in _COUNTS.items():
-            require_count(name, getattr(self, name), low=low, high=high)
+            quantities.require_count(name, getattr(self, name), low=low, high=high)
         for name, quantity in _RANGES.items():
             _check_range(name, getattr(self, name), quantity)
         for name, quantity in _QUANTITIES.items():
@@ -111,7 +98,7 @@ def bounds(values: Range) -> tuple[float, float]:
     return values[0], values[-1]
 
 
-def _check_range(name: str, values: Range, quantity: Quantity) -> None:
+def _check_range(name: str, values: Range, quantity: quantities.Quantity) -> None:
     require(len(values) in (1, 2), name, "one number or two", values)
     quantity.require(name, values)
     require(values[0] <= values[-1], name, "a range, low before high", values)

@@ -9,13 +9,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sainet.scenes.quantities import (
-    ANGLE_DEVIATION,
-    CORRELATION_LENGTH,
-    CORRELATION_TIME,
-    FRACTION,
-    LENGTH_DEVIATION,
-)
+from sainet.scenes import quantities
 
 FRICTION_FEATURES = 32
 NoiseLevel = Literal["none", "default", "paper-like"]
@@ -26,13 +20,13 @@ _SIZES = (
 )
 _FACTOR = {"none": 0.0, "default": 1.0, "paper-like": 3.0}
 _QUANTITIES = {
-    "tracking_mm": LENGTH_DEVIATION.times(1000, "mm"),
-    "correlation_time": CORRELATION_TIME,
-    "force_fraction": FRACTION,
-    "friction_fraction": FRACTION,
-    "friction_length_mm": CORRELATION_LENGTH.times(1000, "mm"),
-    "capture_mm": LENGTH_DEVIATION.times(1000, "mm"),
-    "capture_deg": ANGLE_DEVIATION,
+    "tracking_mm": quantities.LENGTH_DEVIATION.times(1000, "mm"),
+    "correlation_time": quantities.CORRELATION_TIME,
+    "force_fraction": quantities.FRACTION,
+    "friction_fraction": quantities.FRACTION,
+    "friction_length_mm": quantities.CORRELATION_LENGTH.times(1000, "mm"),
+    "capture_mm": quantities.LENGTH_DEVIATION.times(1000, "mm"),
+    "capture_deg": quantities.ANGLE_DEVIATION,
 }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from sainet.datasets.recorded import tables
 from sainet.datasets.recorded.checks import ANGLE, PLACE, recording_problems
 from sainet.datasets.recorded.importing import import_pushes
 from sainet.datasets.recorded.mat import read_mat
@@ -18,14 +19,6 @@ from sainet.datasets.recorded.properties import (
     mitpush_properties,
 )
 from sainet.datasets.recorded.resample import resample
-from sainet.datasets.recorded.tables import (
-    SHOWN,
-    Columns,
-    Problems,
-    Table,
-    read_bytes,
-    read_csv,
-)
 from sainet.datasets.store import Store
 from sainet.runs.documents import content_hash, readable
 from sainet.runs.errors import BadTable
@@ -54,7 +47,7 @@ _AFTER, _TIP_AFTER = ("obj_x1", "obj_y1", "obj_th1"), ("tip_x1", "tip_y1")
 _PUBLISHED = ("zhou_poly4_x1", "zhou_poly4_y1", "zhou_poly4_th1")
 _PLAN = ("s", "t")  # contact and direction of a push as it was planned
 _POSES = (_BEFORE, _AFTER, _PUBLISHED)
-COLUMNS = Columns(
+COLUMNS = tables.Columns(
     texts=("surface", "shape"),
     numbers=(*_PLAN, "vel_mm_s", *_BEFORE, *_AFTER, *_TIP, *_TIP_AFTER, *_PUBLISHED),
     allows_others=True,
@@ -98,7 +91,7 @@ def import_endpoints(
     """
     properties = mitpush_properties(contact_friction, table_friction)
     file = find_log(Path(path))
-    data = read_bytes(file, ".csv", ".mat")
+    data = tables.read_bytes(file, ".csv", ".mat")
     found = read_endpoints(file, data, properties)
     default = contact_friction == CONTACT_FRICTION
     settings = {
@@ -141,11 +134,11 @@ def read_endpoints(path: Path, data: bytes, properties: Properties) -> Endpoints
         BadTable: with file, row (line of the file, from 1; record, from 0) and remedy;
             the first problem of each kind, one a line.
     """
-    problems = Problems()
+    problems = tables.Problems()
     if path.suffix.lower() == ".mat":
         table, model = read_mat(path, data, problems)
     else:
-        table, model = read_csv(path, data, COLUMNS, problems), "poly4"
+        table, model = tables.read_csv(path, data, COLUMNS, problems), "poly4"
         if not data.endswith((b"\n", b"\r")):
             _log.warning("%s: does not end in a line break; it may be truncated", path)
     _check_shapes(table, problems)
@@ -166,23 +159,25 @@ def read_endpoints(path: Path, data: bytes, properties: Properties) -> Endpoints
     return Endpoints(recordings, published, f"zhou-{model}")
 
 
-def _check_shapes(table: Table, problems: Problems) -> None:
+def _check_shapes(table: tables.Table, problems: tables.Problems) -> None:
     shape = table.texts.get("shape")
     for code, name in enumerate(shape.names if shape else []):
         if shape and name and name != MITPUSH_DISK:
             row = int(np.argmax(shape.code == code))
             problems.add(
                 "shape",
-                f"{table.where(row)}: shape is {name[:SHOWN]!r}; sainet models disks: "
-                f"give only pushes of {MITPUSH_DISK}.",
+                f"{table.where(row)}: shape is {name[: tables.SHOWN]!r}; sainet models "
+                f"disks: give only pushes of {MITPUSH_DISK}.",
             )
 
 
-def _columns(table: Table, names: tuple[str, ...]) -> Float[np.ndarray, "push column"]:
+def _columns(
+    table: tables.Table, names: tuple[str, ...]
+) -> Float[np.ndarray, "push column"]:
     return np.column_stack([table.numbers[name] for name in names])
 
 
-def _recordings(table: Table) -> list[Recording]:
+def _recordings(table: tables.Table) -> list[Recording]:
     before = _columns(table, _BEFORE)
     after = _unwrapped(_columns(table, _AFTER), before)
     pose = np.stack([before, after], axis=1)[:, :, None]
@@ -204,7 +199,7 @@ def _recordings(table: Table) -> list[Recording]:
     ]
 
 
-def _plan(table: Table, row: int, surface: str) -> str:
+def _plan(table: tables.Table, row: int, surface: str) -> str:
     """Return surface, contact and direction as planned; a .mat log has neither."""
     if any(name not in table.numbers for name in _PLAN):
         return ""

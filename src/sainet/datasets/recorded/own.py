@@ -8,24 +8,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from sainet.datasets.recorded.checks import (
-    ANGLE,
-    PLACE,
-    clock_problems,
-    first_fall,
-    recording_problems,
-)
+from sainet.datasets.recorded import checks, tables
 from sainet.datasets.recorded.importing import import_pushes
 from sainet.datasets.recorded.properties import Properties, read_properties
 from sainet.datasets.recorded.resample import resample
-from sainet.datasets.recorded.tables import (
-    SHOWN,
-    Columns,
-    Problems,
-    Table,
-    read_bytes,
-    read_csv,
-)
 from sainet.datasets.store import Store
 from sainet.runs.documents import content_hash
 from sainet.scenes.recording import Conditions, Recording
@@ -33,7 +19,7 @@ from sainet.scenes.recording import Conditions, Recording
 _log = logging.getLogger(__name__)
 _PLACES = ("x", "y", "pusher_x", "pusher_y")
 _SAME_PLACE = 1e-6  # m
-COLUMNS = Columns(
+COLUMNS = tables.Columns(
     texts=("push", "body"),
     optional=("group",),
     numbers=("time", "x", "y", "angle", "pusher_x", "pusher_y"),
@@ -62,8 +48,8 @@ def import_table(
         RunConflict: the folder holds something else.
         BadInput: the disk is full.
     """
-    path, problems = Path(path), Problems()
-    data = read_bytes(path, ".csv", ".parquet")
+    path, problems = Path(path), tables.Problems()
+    data = tables.read_bytes(path, ".csv", ".parquet")
     table = _read(path, data, problems)
     known = read_properties(Path(properties), contact_friction, problems)
     bodies = _present(table, known, Path(properties), problems)
@@ -82,16 +68,16 @@ def import_table(
     )
 
 
-def _read(path: Path, data: bytes, problems: Problems) -> Table:
+def _read(path: Path, data: bytes, problems: tables.Problems) -> tables.Table:
     if path.suffix.lower() == ".parquet":
         from sainet.datasets.recorded.parquet import read_parquet
 
         return read_parquet(path, data, COLUMNS, problems)
-    return read_csv(path, data, COLUMNS, problems)
+    return tables.read_csv(path, data, COLUMNS, problems)
 
 
 def _present(
-    table: Table, known: Properties, path: Path, problems: Problems
+    table: tables.Table, known: Properties, path: Path, problems: tables.Problems
 ) -> Properties | None:
     """Return the properties of the bodies of the table, None if some have none."""
     if "body" not in table.texts or not known.bodies:
@@ -102,8 +88,8 @@ def _present(
             row = int(np.argmax(body.code == code))
             problems.add(
                 "unknown body",
-                f"{table.where(row)}: body {name[:SHOWN]!r} has no properties; add "
-                f"[bodies.NAME] to {path}.",
+                f"{table.where(row)}: body {name[: tables.SHOWN]!r} has no properties; "
+                f"add [bodies.NAME] to {path}.",
             )
     if not set(body.names) <= {*known.bodies, ""}:
         return None
@@ -119,24 +105,24 @@ def _present(
 
 
 def _recordings(
-    table: Table, properties: Properties, problems: Problems
+    table: tables.Table, properties: Properties, problems: tables.Problems
 ) -> Iterator[Recording]:
     """Yield the pushes of a table in the order in which they first appear.
 
     Rows of different pushes and bodies may be in any order; times of one body in one
     push must rise. Pushes with a problem are left out.
     """
-    table.check(problems, PLACE, *_PLACES)
-    table.check(problems, ANGLE, "angle")
+    table.check(problems, checks.PLACE, *_PLACES)
+    table.check(problems, checks.ANGLE, "angle")
     if not table.is_whole:
         return  # further checks would repeat the problems of the header and rows
-    units_fit = not ({PLACE.name, ANGLE.name} & problems.kinds)
+    units_fit = not ({checks.PLACE.name, checks.ANGLE.name} & problems.kinds)
     for push in _by_push(table, properties):
         recording = push.to_recording(problems) if push.is_sound(problems) else None
         if recording is None:
             continue
-        find = recording_problems(recording, properties) if units_fit else None
-        for problem in find or clock_problems(recording):
+        find = checks.recording_problems(recording, properties) if units_fit else None
+        for problem in find or checks.clock_problems(recording):
             row = push.rows[problem.body][problem.sample]
             line = f"{table.where(row)}: {push.name}: {problem.text}."
             problems.add(problem.kind, line)
@@ -145,13 +131,13 @@ def _recordings(
             yield recording
 
 
-def _by_push(table: Table, properties: Properties) -> Iterator["_Push"]:
+def _by_push(table: tables.Table, properties: Properties) -> Iterator["_Push"]:
     push, body = table.texts["push"], table.texts["body"]
     order = np.argsort(push.code, kind="stable")
     first = np.searchsorted(push.code[order], np.arange(len(push.names)))
     for code, rows in enumerate(np.split(order, first[1:])):
         own = [rows[body.code[rows] == body.names.index(n)] for n in properties.bodies]
-        name = f"push {push.names[code][:SHOWN]!r}"
+        name = f"push {push.names[code][: tables.SHOWN]!r}"
         yield _Push(table, name, properties.bodies, own)
 
 
@@ -159,7 +145,7 @@ def _by_push(table: Table, properties: Properties) -> Iterator["_Push"]:
 class _Push:
     """Rows of one push."""
 
-    table: Table
+    table: tables.Table
     name: str
     bodies: tuple[str, ...]
     rows: list[Int[np.ndarray, " _"]]  # of each body
@@ -170,7 +156,7 @@ class _Push:
     def pusher(self, body: int) -> Float[np.ndarray, "sample 2"]:
         return np.column_stack([self.column(f"pusher_{axis}", body) for axis in "xy"])
 
-    def is_sound(self, problems: Problems) -> bool:
+    def is_sound(self, problems: tables.Problems) -> bool:
         """Return whether all bodies have the same rising times and the same pusher."""
         numbers = (self.column(n, b) for n in COLUMNS.numbers for b in self._indices)
         if not all(np.isfinite(values).all() for values in numbers):
@@ -201,7 +187,7 @@ class _Push:
             text = f"{named} is missing; all pushes of a file need the same bodies"
             return "missing body", self.rows[first][0], text
         time, wanted = self.column("time", body), self.column("time", first)
-        fall = first_fall(time)
+        fall = checks.first_fall(time)
         if fall is not None:
             same = time[fall] == time[fall - 1]
             wrong = "appears twice" if same else f"comes after {time[fall - 1]:.12g}"
@@ -223,7 +209,7 @@ class _Push:
             return "pusher", row, f"{text} time; repair one of them"
         return None
 
-    def to_recording(self, problems: Problems) -> Recording | None:
+    def to_recording(self, problems: tables.Problems) -> Recording | None:
         """Return the recording; None after adding a problem of its group."""
         surface = ""
         if "group" in self.table.texts:

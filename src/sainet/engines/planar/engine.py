@@ -6,6 +6,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from sainet.engines.base import AbstractEngine
+from sainet.engines.planar import solver
 from sainet.engines.planar.bodies import (
     Bodies,
     Properties,
@@ -14,12 +15,6 @@ from sainet.engines.planar.bodies import (
     to_state,
 )
 from sainet.engines.planar.contact import Twist
-from sainet.engines.planar.solver import (
-    Step,
-    contact_budget,
-    solve_all_pairs,
-    solve_close_pairs,
-)
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -85,10 +80,10 @@ class PlanarEngine(AbstractEngine):
     ) -> Bodies:
         bodies = _drive(bodies, controls, control, scene.time_step)
         limits = _table_limits(scene, properties, bodies)
-        step = Step(scene.time_step, self.recovery, self.sweeps)
+        step = solver.Step(scene.time_step, self.recovery, self.sweeps)
         count = len(bodies.x)
-        every_pair = contact_budget(count) == count * (count - 1) // 2
-        solve = solve_all_pairs if every_pair else solve_close_pairs
+        every_pair = solver.contact_budget(count) == count * (count - 1) // 2
+        solve = solver.solve_all_pairs if every_pair else solver.solve_close_pairs
         return _integrate(
             bodies, solve(bodies, properties, limits, step), scene.time_step
         )

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float, PRNGKeyArray
 
+from sainet.models import integrators
 from sainet.models.correctors import AbstractCorrector, Prediction, Purpose, Start
 from sainet.models.features import FeatureSet
 from sainet.models.inputs import (
@@ -24,12 +25,6 @@ from sainet.models.inputs import (
     motion_to_frame,
     near_pairs,
     still_features,
-)
-from sainet.models.integrators import (
-    Acceleration,
-    Integrator,
-    RelaxingResidual,
-    bound_gradient,
 )
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
@@ -97,7 +92,7 @@ class InteractionNetwork(AbstractCorrector):
     scales: Scales
     features: FeatureSet = eqx.field(static=True)
     time_step: float = eqx.field(static=True)  # s
-    integrator: Integrator = eqx.field(static=True)
+    integrator: integrators.Integrator = eqx.field(static=True)
 
     def __init__(
         self,
@@ -106,7 +101,7 @@ class InteractionNetwork(AbstractCorrector):
         time_step: float,
         key: PRNGKeyArray,
         scales: Scales | None = None,
-        integrator: Integrator = Acceleration(),  # noqa: B008
+        integrator: integrators.Integrator = integrators.Acceleration(),  # noqa: B008
     ) -> None:
         """Make an untrained network.
 
@@ -121,7 +116,7 @@ class InteractionNetwork(AbstractCorrector):
         rel_key, dyn_key = jax.random.split(key)
         self.rel = Layers((features.pair_size, *WIDTHS), key=rel_key)
         dyn = Layers((features.body_size + EFFECT, *WIDTHS, 3), key=dyn_key)
-        is_additive = isinstance(integrator, RelaxingResidual)
+        is_additive = isinstance(integrator, integrators.RelaxingResidual)
         self.dyn = _silenced(dyn) if is_additive else dyn
         self.scales = scales or unit_scales(features)
         self.features = features
@@ -272,7 +267,7 @@ def unroll(
 
     @jax.checkpoint
     def body(motion: Array, now: Drive) -> tuple[Array, Array]:
-        motion = network.step(bound_gradient(motion), still, now)
+        motion = network.step(integrators.bound_gradient(motion), still, now)
         return motion, motion
 
     time_first = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)

@@ -8,15 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from sainet.evaluation.summary import Estimate, Row, Summary
-from sainet.report.figures.canvas import (
-    LineLook,
-    add_grid,
-    house_look,
-    label_ends,
-    line_look,
-    new_figure,
-    save,
-)
+from sainet.report.figures import canvas
 from sainet.report.palette import ModelStyle, styles_of
 
 FACTOR = "training_pushes"
@@ -61,8 +53,8 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
     bodies = sorted({each.row.body for each in rows})
     cases = [(metric, body) for metric in _METRICS for body in bodies]
     down, across = (1, 2) if len(bodies) == 1 else (2, len(bodies))
-    with house_look():
-        figure = new_figure(1.4 + 4.1 * across, 3.3 * down)
+    with canvas.house_look():
+        figure = canvas.new_figure(1.4 + 4.1 * across, 3.3 * down)
         panels = list(figure.subplots(down, across).flat)
         for (metric, body), axes in zip(cases, panels, strict=True):
             _set_axes(axes, sorted(sizes.values()))
@@ -74,8 +66,8 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         figure.draw_without_rendering()
         for (metric, body), axes in zip(cases, panels, strict=True):
             ends = [_end(_of(rows, name, body), metric) for name in styles]
-            label_ends(axes, list(styles.values()), ends)
-        return save(figure, path)
+            canvas.label_ends(axes, list(styles.values()), ends)
+        return canvas.save(figure, path)
 
 
 def _of(rows: list[_Row], model: str, body: int) -> list[_Row]:
@@ -99,9 +91,9 @@ def _draw_model(axes: Axes, style: ModelStyle, rows: list[_Row], metric: str) ->
     found = [_estimate(each.row, metric) for each in rows]
     error, low, high = np.array([(e.value, e.low, e.high) for e in found], float).T
     learns = np.ptp(error) > 0
-    look = line_look(style, 1.6 if learns else 1.0)
+    look = canvas.line_look(style, 1.6 if learns else 1.0)
     if learns:
-        look |= LineLook(marker="o", markersize=3.5)
+        look |= canvas.LineLook(marker="o", markersize=3.5)
     axes.plot(pushes, error, **look)
     if learns:
         axes.fill_between(pushes, low, high, alpha=0.16, color=style.color, linewidth=0)
@@ -113,7 +105,7 @@ def _set_axes(axes: Axes, sizes: list[int]) -> None:
     axes.xaxis.set_major_locator(FixedLocator(sizes))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
     axes.xaxis.set_minor_locator(NullLocator())
-    add_grid(axes)
+    canvas.add_grid(axes)
 
 
 def _set_scale(axes: Axes) -> None:

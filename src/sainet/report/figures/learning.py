@@ -11,23 +11,16 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from scipy.ndimage import uniform_filter1d
 
 from sainet.learning.log import LogLine
-from sainet.report.figures.canvas import (
-    LineLook,
-    add_grid,
-    house_look,
-    label_ends,
-    new_figure,
-    save,
-)
+from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
 
 History = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 _WINDOW = 0.1  # fraction of the logged losses in a mean
 # The style of each kind of line.
-_BATCH = LineLook(linewidth=0.7, alpha=0.45)
-_MEAN = LineLook(linewidth=1.6)
-_VALIDATION = LineLook(linestyle=":", marker="o", markersize=3)
+_BATCH = canvas.LineLook(linewidth=0.7, alpha=0.45)
+_MEAN = canvas.LineLook(linewidth=1.6)
+_VALIDATION = canvas.LineLook(linestyle=":", marker="o", markersize=3)
 
 
 def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
@@ -39,8 +32,8 @@ def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
         path: where to write; ``.svg`` or ``.png``.
     """
     styles = styles_of(histories)
-    with house_look():
-        figure = new_figure(6.4, 3.4)
+    with canvas.house_look():
+        figure = canvas.new_figure(6.4, 3.4)
         axes = figure.subplots()
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -51,13 +44,13 @@ def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
         axes.set(xlabel="iteration", ylabel="loss", title="Learning")
         axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
         axes.margins(x=0.02)
-        add_grid(axes)
+        canvas.add_grid(axes)
         _explain_lines(axes, histories)
         figure.draw_without_rendering()
         ends = {name: _end(history) for name, history in histories.items()}
         known = {name: end for name, end in ends.items() if end is not None}
-        label_ends(axes, [styles[name] for name in known], [*known.values()])
-        return save(figure, path)
+        canvas.label_ends(axes, [styles[name] for name in known], [*known.values()])
+        return canvas.save(figure, path)
 
 
 def running_mean(losses: Float[np.ndarray, " logged"]) -> Float[np.ndarray, " logged"]:

@@ -19,14 +19,7 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
-from sainet.report.figures.canvas import (
-    add_grid,
-    house_look,
-    label_ends,
-    line_look,
-    new_figure,
-    save,
-)
+from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
 from sainet.report.replay import Replay, Track
 
@@ -46,12 +39,12 @@ def draw_paths(replay: Replay, path: Path) -> Path:
     centre on a millimetre scale, with the final errors of each model.
     """
     styles = styles_of(replay.tracks)
-    with house_look():
+    with canvas.house_look():
         figure, panels = _push_panels(replay.body_count, len(styles))
         _draw_scene(panels[0], replay, styles)
         for body, axes in enumerate(panels[1:]):
             _draw_lens(axes, replay, body, styles)
-        return save(figure, path)
+        return canvas.save(figure, path)
 
 
 def draw_error_over_time(
@@ -71,13 +64,13 @@ def draw_error_over_time(
     """
     styles = styles_of(curves)
     bodies = next(iter(curves.values())).shape[1]
-    with house_look():
-        figure = new_figure(1.2 + 3.6 * bodies, 3.2)
+    with canvas.house_look():
+        figure = canvas.new_figure(1.2 + 3.6 * bodies, 3.2)
         panels = figure.subplots(1, bodies, squeeze=False, sharey=True)[0]
         for body, axes in enumerate(panels):
             for name, curve in curves.items():
                 time = time_step * np.arange(1, len(curve) + 1)
-                axes.plot(time, curve[:, body], **line_look(styles[name]))
+                axes.plot(time, curve[:, body], **canvas.line_look(styles[name]))
                 if bands and name in bands:
                     low, high = (side[:, body] for side in bands[name])
                     look = {"color": styles[name].color, "linewidth": 0}
@@ -88,10 +81,10 @@ def draw_error_over_time(
         for axes in panels:
             axes.set_xlim(0, axes.dataLim.x1)
             axes.margins(x=0)
-            add_grid(axes)
+            canvas.add_grid(axes)
         figure.draw_without_rendering()
         _label_panels(panels, curves, styles, time_step)
-        return save(figure, path)
+        return canvas.save(figure, path)
 
 
 def _label_panels(
@@ -102,7 +95,7 @@ def _label_panels(
 ) -> None:
     for body, axes in enumerate(panels):
         ends = [(time_step * len(curve), curve[-1, body]) for curve in curves.values()]
-        label_ends(axes, list(styles.values()), ends)
+        canvas.label_ends(axes, list(styles.values()), ends)
 
 
 def _push_panels(lenses: int, models: int) -> tuple[Figure, list[Axes]]:
@@ -129,7 +122,9 @@ def _draw_scene(axes: Axes, replay: Replay, styles: dict[str, ModelStyle]) -> No
         style = styles[name]
         for body, radius in enumerate(replay.radius):
             _circle(axes, track.position[-1, body], radius, edgecolor=style.color)
-            axes.plot(*(_MM * track.position[:, body].T), **line_look(style, 1.0))
+            axes.plot(
+                *(_MM * track.position[:, body].T), **canvas.line_look(style, 1.0)
+            )
     for body in range(replay.body_count):
         axes.plot(*(_MM * reference.position[:, body].T), color=INK, linewidth=1.2)
     axes.autoscale_view()
@@ -153,11 +148,11 @@ def _draw_lens(
     # Draw the ground truth last, on top of the predictions.
     for name in [*list(paths)[1:], *list(paths)[:1]]:
         path = paths[name]
-        axes.plot(*path.T, **line_look(styles[name]))
+        axes.plot(*path.T, **canvas.line_look(styles[name]))
         axes.plot(*path[-1], "o", color=styles[name].color, markersize=5)
     axes.plot(0, 0, "o", markersize=4, markerfacecolor="none", markeredgecolor=INK)
     _frame(axes, np.concatenate(list(paths.values())))
-    add_grid(axes, "both")
+    canvas.add_grid(axes, "both")
     axes.set(xlabel="x (mm)", ylabel="y (mm)", title=f"Centre of disk {body + 1}")
     handles = [_handle(replay, name, body, style) for name, style in styles.items()]
     _explain_below(axes, handles)
@@ -236,4 +231,4 @@ def _handle(replay: Replay, name: str, body: int, style: ModelStyle) -> Line2D:
         turn = replay.final_turn_deg(name)[body]
         if np.isfinite(error + turn):
             label = f"{label}: {error:.2f} mm, {turn:.1f}°"
-    return Line2D([], [], label=label, **line_look(style))
+    return Line2D([], [], label=label, **canvas.line_look(style))
