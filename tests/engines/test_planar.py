@@ -15,7 +15,7 @@ from contracts.worlds import (
 from engines.naive import Body, World
 from sainet.datasets.config import GenerateConfig
 from sainet.engines.base import roll_out
-from sainet.engines.planar import engine as planar
+from sainet.engines.planar import solver
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.planar.solver import contact_budget, solve_close_pairs
 from sainet.scenes.scene import FrictionField
@@ -97,9 +97,9 @@ def test_both_solvers_agree(monkeypatch, bodies, setup):
     as_chosen = roll_out(PlanarEngine(), *whole).states
     few = contact_budget(bodies + 1) < bodies * (bodies + 1) // 2
     if few:
-        monkeypatch.setattr(planar, "solve_close_pairs", planar.solve_all_pairs)
+        monkeypatch.setattr(solver, "solve_close_pairs", solver.solve_all_pairs)
     else:
-        monkeypatch.setattr(planar, "solve_all_pairs", solve_close_pairs)
+        monkeypatch.setattr(solver, "solve_all_pairs", solve_close_pairs)
     # Other settings than above, or the compiled rollout would be used again.
     other = roll_out(PlanarEngine(recovery=0.0800001), *whole).states
     np.testing.assert_allclose(other.position, as_chosen.position, atol=1e-5)
