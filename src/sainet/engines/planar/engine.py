@@ -7,14 +7,14 @@ from jaxtyping import Array, Float
 
 from sainet.engines.base import AbstractEngine
 from sainet.engines.planar import solver
-from sainet.engines.planar.bodies import (
+from sainet.engines.planar.contact import (
     Bodies,
     Properties,
+    Twist,
     to_bodies,
     to_properties,
     to_state,
 )
-from sainet.engines.planar.contact import Twist
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory

@@ -16,10 +16,11 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Int
 
-from sainet.engines.planar.bodies import Bodies, Properties
 from sainet.engines.planar.contact import (
+    Bodies,
     Contact,
     ContactImpulse,
+    Properties,
     Side,
     TableImpulse,
     Twist,
