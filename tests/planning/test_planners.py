@@ -19,8 +19,7 @@ from sainet.planning import PLANNERS, make_planner
 from sainet.planning import tree as tree_module
 from sainet.planning.checks import doubts_of_training
 from sainet.planning.greedy import GreedyPlanner
-from sainet.planning.levels import Level, Problem
-from sainet.planning.outcomes import every_push, roll_pushes
+from sainet.planning.levels import Level, Problem, every_push, roll_pushes
 from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
 from sainet.scenes.pushes import PushGrid

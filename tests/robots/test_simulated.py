@@ -9,7 +9,7 @@ import pytest
 from planning.scenes import scene, touching
 from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
-from sainet.planning.outcomes import roll_pushes
+from sainet.planning.levels import roll_pushes
 from sainet.robots.simulated import SimulatedRobot
 from sainet.scenes.pushes import PushGrid
 from sainet.worlds.noise import NoiseConfig, at_level

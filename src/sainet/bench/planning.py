@@ -20,7 +20,7 @@ from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.library import load_model
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.base import Plan
-from sainet.planning.outcomes import batch_of, roll_pushes
+from sainet.planning.levels import batch_of, roll_pushes
 from sainet.scenes.pushes import PushGrid
 
 DECISIONS = 50

@@ -13,8 +13,7 @@ from jaxtyping import Array, Float
 
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.checks import check_model, check_observation, doubts
-from sainet.planning.levels import Found, Problem
-from sainet.planning.outcomes import batch_of, roll_pushes
+from sainet.planning.levels import Found, Problem, batch_of, roll_pushes
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest

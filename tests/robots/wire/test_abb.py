@@ -28,7 +28,7 @@ from sainet.datasets.recorded.resample import resample
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.models.dynamics import PhysicsDynamics
-from sainet.planning.outcomes import roll_pushes
+from sainet.planning.levels import roll_pushes
 from sainet.robots.wire.abb import AbbRobot, NoPose
 from sainet.robots.wire.arm import AbstractArm, DryArm
 from sainet.robots.wire.cell import Cell, read_cell
