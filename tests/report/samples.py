@@ -8,7 +8,7 @@ from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Comparison, Estimate, Factor, Row, Summary
 from sainet.models.identity import ModelId
-from sainet.report.replay import Replay, Track
+from sainet.report.episode_frames import Replay, Track
 
 STEPS = 200
 TIME_STEP = 1 / 240  # s

@@ -20,10 +20,9 @@ from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import PAPER
 from sainet.models.dynamics import predict
 from sainet.models.library import Model
-from sainet.report.episode_frames import outcome
+from sainet.report.episode_frames import Replay, Track, outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report
-from sainet.report.replay import Replay, Track
 from sainet.runs.documents import read_json, write_document
 from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST

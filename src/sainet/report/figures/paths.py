@@ -19,9 +19,9 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
+from sainet.report.episode_frames import Replay, Track
 from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
-from sainet.report.replay import Replay, Track
 
 Curve = Float[np.ndarray, "time body"]  # mm
 _MM = 1e3  # mm in a metre

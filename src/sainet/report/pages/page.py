@@ -13,10 +13,9 @@ from markupsafe import Markup
 from sainet.control.record import EpisodeRecord
 from sainet.evaluation.summary import Summary
 from sainet.report.arrange import arrange
-from sainet.report.episode_frames import episode_data
+from sainet.report.episode_frames import Replay, Track, episode_data
 from sainet.report.pages import read, render
 from sainet.report.palette import css_variables, styles_of
-from sainet.report.replay import Replay, Track
 from sainet.report.writers import to_html
 from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadInput
