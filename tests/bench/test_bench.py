@@ -24,9 +24,8 @@ from sainet.bench.peer import (
     run_torch,
     save_problem,
 )
-from sainet.bench.problem import Problem, make_problem
 from sainet.bench.timing import ceiling_gflops, median_seconds
-from sainet.bench.training import TrainingLoop, counted_gflop
+from sainet.bench.training import Problem, TrainingLoop, counted_gflop, make_problem
 from sainet.cli.bench import Bench, bench_commands
 from sainet.cli.output import Output
 from sainet.learning.step import trained_layers, with_layers

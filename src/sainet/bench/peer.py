@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Array
 
-from sainet.bench.problem import Problem
+from sainet.bench.training import Problem
 from sainet.learning.loss import path_to_frame, to_target
 from sainet.models.correctors.interaction import FEATURE_BOUND
 from sainet.models.inputs import drives, motion_to_frame, push_frame, still_features
