@@ -15,7 +15,7 @@ from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene, check_scene
 from sainet.scenes.state import State
-from sainet.tasks.base import AbstractTask
+from sainet.tasks.push_to_goal import AbstractTask
 
 SOLVED = "solved"  # why most episodes end
 MOST_TROUBLES = 3  # in a row

@@ -17,7 +17,7 @@ from sainet.planning.levels import Found, Problem, batch_of, roll_pushes
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
-from sainet.tasks.base import AbstractTask
+from sainet.tasks.push_to_goal import AbstractTask
 
 
 @dataclass(frozen=True)

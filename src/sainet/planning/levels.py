@@ -17,7 +17,7 @@ from sainet.scenes.pushes import Push, PushGrid, command_path, place_pusher
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, Trajectory, at_rest
-from sainet.tasks.base import AbstractTask
+from sainet.tasks.push_to_goal import AbstractTask
 
 SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 

@@ -3,6 +3,7 @@
 Goals are random: easy goals ahead, hard goals aside.
 """
 
+from abc import abstractmethod
 from typing import Literal
 
 import equinox as eqx
@@ -14,7 +15,23 @@ from sainet.runs.errors import BadScene
 from sainet.scenes.geometry import norm
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
-from sainet.tasks.base import AbstractTask
+
+
+class AbstractTask(eqx.Module):
+    """A task that the robot has to solve; arguments share their leading batch axes."""
+
+    @abstractmethod
+    def distance(self, state: State) -> Float[Array, "*batch"]:
+        """Return the remaining distance (m)."""
+
+    @abstractmethod
+    def cost(self, state: State) -> Float[Array, "*batch"]:
+        """Return the cost that planners minimise (m)."""
+
+    @abstractmethod
+    def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
+        """Return whether the task is solved."""
+
 
 TOLERANCE_RADII = 0.1
 ALIGNMENT = 3.0
