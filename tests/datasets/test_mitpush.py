@@ -18,8 +18,8 @@ from scipy.io import savemat
 
 from sainet.datasets.batch import to_batch
 from sainet.datasets.recorded import importing
+from sainet.datasets.recorded.binary import FIELDS
 from sainet.datasets.recorded.endpoints import import_endpoints
-from sainet.datasets.recorded.mat import FIELDS
 from sainet.datasets.store import Store, open_store
 from sainet.runs.errors import BadInput, BadStore, BadTable, RunConflict
 from support import SOURCE

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from sainet.datasets.recorded.binary import FIELDS, read_mat
 from sainet.datasets.recorded.endpoints import (
     COLUMNS,
     Endpoints,
     find_log,
     read_endpoints,
 )
-from sainet.datasets.recorded.mat import FIELDS, read_mat
 from sainet.datasets.recorded.properties import mitpush_properties
 from sainet.datasets.recorded.tables import Problems
 from sainet.runs.errors import BadTable

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.recorded import tables
+from sainet.datasets.recorded.binary import read_mat
 from sainet.datasets.recorded.checks import ANGLE, PLACE, recording_problems
 from sainet.datasets.recorded.importing import import_pushes
-from sainet.datasets.recorded.mat import read_mat
 from sainet.datasets.recorded.properties import (
     CONTACT_FRICTION,
     MITPUSH_DISK,

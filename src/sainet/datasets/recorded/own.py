@@ -70,7 +70,7 @@ def import_table(
 
 def _read(path: Path, data: bytes, problems: tables.Problems) -> tables.Table:
     if path.suffix.lower() == ".parquet":
-        from sainet.datasets.recorded.parquet import read_parquet
+        from sainet.datasets.recorded.binary import read_parquet
 
         return read_parquet(path, data, COLUMNS, problems)
     return tables.read_csv(path, data, COLUMNS, problems)
