@@ -7,7 +7,7 @@ import msgspec
 from report import samples
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Estimate
-from sainet.report.figures.efficiency import draw_data_efficiency
+from sainet.report.figures.curves import draw_data_efficiency
 from sainet.report.palette import style_of
 
 

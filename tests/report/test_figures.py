@@ -12,7 +12,7 @@ from sainet.engines.simulator import SIMULATORS
 from sainet.models.identity import ModelId
 from sainet.report.episode_frames import Replay, Track
 from sainet.report.figures.canvas import spread
-from sainet.report.figures.learning import draw_learning_curve, running_mean
+from sainet.report.figures.curves import draw_learning_curve, running_mean
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages import read
 from sainet.report.palette import css_variables, style_of, styles_of

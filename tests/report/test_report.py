@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from report import samples
-from sainet.report.figures.learning import draw_learning_curve
+from sainet.report.figures.curves import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
 from sainet.report.pages.page import Report, replay_data, to_page, write_report
 

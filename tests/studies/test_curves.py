@@ -1,7 +1,7 @@
 """The learning curve shows a training, not where it was written."""
 
 from sainet.learning.log import LogLine
-from sainet.report.figures.learning import draw_history
+from sainet.report.figures.curves import draw_history
 
 LOG = [
     LogLine(5, 2.0),

@@ -9,7 +9,7 @@ import pytest
 from report import samples
 from sainet.control.record import FOLDER
 from sainet.models.library import PRETRAINED
-from sainet.report.figures.learning import draw_learning_curve
+from sainet.report.figures.curves import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
 from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput

@@ -90,7 +90,7 @@ class Job:
         from sainet.datasets.store import open_store
         from sainet.learning.fit import fit
         from sainet.learning.log import loss_note
-        from sainet.report.figures.learning import draw_history
+        from sainet.report.figures.curves import draw_history
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)

@@ -7,7 +7,7 @@ from sainet.datasets.store import Store
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER
-from sainet.report.figures.efficiency import draw_data_efficiency
+from sainet.report.figures.curves import draw_data_efficiency
 from sainet.studies.paper_setup import IN, SAIN, PaperSetup
 from sainet.studies.recorded_models import TunedModels, Variant, surfaces_of
 from sainet.studies.recorded_pushes import FOLDS, SUBJECT, JoinFolds

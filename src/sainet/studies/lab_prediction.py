@@ -31,7 +31,7 @@ from sainet.evaluation.metrics import (
 )
 from sainet.evaluation.summary import Summary
 from sainet.models.identity import ModelId
-from sainet.report.figures.efficiency import FACTOR, draw_data_efficiency
+from sainet.report.figures.curves import FACTOR, draw_data_efficiency
 from sainet.studies.lab_pushes import (
     AROUND_IDENTIFIED,
     IN_TUNED,
