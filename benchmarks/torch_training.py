@@ -2,8 +2,8 @@
 
     benchmarks/.venv/bin/python benchmarks/torch_training.py PROBLEM.npz [ITERATIONS]
 
-The problem is what `sainet.bench.peer.save_problem` writes: a batch of pushes in the
-push frame, the weights to start from and the settings. The last line of standard output
+The problem is what `sainet.bench.training.save_problem` writes: a batch of pushes in
+the push frame, the weights to start from and the settings. The last line of output
 is one JSON object: the loss before the first step, the losses of all steps, and the
 median time of an iteration.
 """

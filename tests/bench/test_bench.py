@@ -17,15 +17,18 @@ from jax.extend.core import ClosedJaxpr, Jaxpr
 
 from sainet.bench import CASES
 from sainet.bench import training as training_case
-from sainet.bench.peer import (
+from sainet.bench.timing import ceiling_gflops, median_seconds
+from sainet.bench.training import (
+    Problem,
     TorchPeer,
     TorchRun,
+    TrainingLoop,
+    counted_gflop,
+    make_problem,
     missing_torch,
     run_torch,
     save_problem,
 )
-from sainet.bench.timing import ceiling_gflops, median_seconds
-from sainet.bench.training import Problem, TrainingLoop, counted_gflop, make_problem
 from sainet.cli.bench import Bench, bench_commands
 from sainet.cli.output import Output
 from sainet.learning.step import trained_layers, with_layers
@@ -292,17 +295,17 @@ def test_a_failing_peer_reports_its_error(tmp_path: Path):
 @pytest.mark.parametrize("loss", [1.01, 0.99, math.nan])
 def test_a_peer_with_another_first_loss_is_refused(loss, monkeypatch):
     result = TorchRun((loss,), iteration_ms=7.0)
-    monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
+    monkeypatch.setattr("sainet.bench.training.run_torch", lambda *_: result)
     with pytest.raises(SainetError, match="same work"):
         TorchPeer(Path("problem.npz"), 1.0).iteration_ms()
 
 
 def test_a_peer_may_differ_by_rounding(monkeypatch):
     result = TorchRun((1.0005,), iteration_ms=7.0)
-    monkeypatch.setattr("sainet.bench.peer.run_torch", lambda *_: result)
+    monkeypatch.setattr("sainet.bench.training.run_torch", lambda *_: result)
     assert TorchPeer(Path("problem.npz"), 1.0).iteration_ms() == 7.0
 
 
 def test_a_missing_environment_gives_a_remedy(monkeypatch, tmp_path):
-    monkeypatch.setattr("sainet.bench.peer.FOLDER", tmp_path)
+    monkeypatch.setattr("sainet.bench.training.FOLDER", tmp_path)
     assert "make torch-env" in str(missing_torch())
