@@ -1,6 +1,7 @@
 """The arrays and files of a dataset: dimensions, units, meaning and range of each."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import msgspec
@@ -122,13 +123,16 @@ class Variable:
         return (min(info.chunk_size, info.pushes), *self.shape(info)[1:])
 
 
+_hashed = partial(Variable, is_hashed=True)
+_requested = partial(Variable, is_input=False)
 _POSE_QUANTITIES = (POSITION, POSITION, ANGLE)
 _MOTION_QUANTITIES = (*_POSE_QUANTITIES, VELOCITY, VELOCITY, SPIN)
 _PUSH = ("push",)
 _BODY = ("push", "body")
-_MOTION = ("push", "time", "body", "motion")
-_PATH = ("push", "time", "xy")
-_XY = ("push", "xy")
+_STEP = ("push", "time")
+_POSE, _MOTION = (*_BODY, "pose"), (*_BODY, "motion")
+_POSES, _MOTIONS = (*_STEP, "body", "pose"), (*_STEP, "body", "motion")
+_XY, _PATH = ("push", "xy"), (*_STEP, "xy")
 _MEANINGS = {
     "mass": "mass of a disk",
     "radius": "radius of a disk",
@@ -144,53 +148,33 @@ _ALWAYS = {
     )
     for name, quantity in PROPERTIES.items()
 } | {
-    "steps": Variable(
-        _PUSH, "number of steps of the push", dtype=np.int32, is_hashed=True
-    ),
-    "group": Variable(
-        _PUSH, "index into the attribute groups", dtype=np.int32, is_input=False
-    ),
-    "initial": Variable(
-        ("push", "body", "motion"),
-        "state before the push",
-        _MOTION_QUANTITIES,
-        is_hashed=True,
-    ),
-    "initial_pusher": Variable(
-        _XY, "pusher before the push", (POSITION,), is_hashed=True
-    ),
-    "truth": Variable(_MOTION, "true state after each step", _MOTION_QUANTITIES),
-    "truth_pusher": Variable(
-        _PATH, "true pusher after each step", (POSITION,), is_input=False
-    ),
-    "pose_observed": Variable(
-        ("push", "time"), "1 where the pose is known", dtype=np.uint8
-    ),
+    "steps": _hashed(_PUSH, "number of steps of the push", dtype=np.int32),
+    "group": _requested(_PUSH, "index into the attribute groups", dtype=np.int32),
+    "initial": _hashed(_MOTION, "state before the push", _MOTION_QUANTITIES),
+    "initial_pusher": _hashed(_XY, "pusher before the push", (POSITION,)),
+    "truth": Variable(_MOTIONS, "true state after each step", _MOTION_QUANTITIES),
+    "truth_pusher": _requested(_PATH, "true pusher after each step", (POSITION,)),
+    "pose_observed": Variable(_STEP, "1 where the pose is known", dtype=np.uint8),
     "rate_observed": Variable(
-        ("push", "time"), "1 where the velocities are known", dtype=np.uint8
+        _STEP, "1 where the velocities are known", dtype=np.uint8
     ),
 }
 
 # Arrays of the controls, by the names that `scenes.controls` gives them.
 _COMMANDS: dict[SetupName, dict[str, Variable]] = {
     "robot": {
-        "command_position": Variable(
-            _PATH, "commanded pusher after each step", (POSITION,), is_hashed=True
+        "command_position": _hashed(
+            _PATH, "commanded pusher after each step", (POSITION,)
         ),
         "command_velocity": Variable(
             _PATH, "commanded velocity during each step", (VELOCITY,)
         ),
     },
     "direct-force": {
-        "force": Variable(
-            _PATH,
-            "commanded force on the pusher during each step",
-            (FORCE,),
-            is_hashed=True,
+        "force": _hashed(
+            _PATH, "commanded force on the pusher during each step", (FORCE,)
         ),
-        "contact_offset": Variable(
-            _XY, "pusher minus disk 1 at the start", (POSITION,), is_hashed=True
-        ),
+        "contact_offset": _hashed(_XY, "pusher minus disk 1 at the start", (POSITION,)),
     },
 }
 
@@ -199,31 +183,20 @@ def variables(info: StoreInfo) -> dict[str, Variable]:
     """Return every array of such a store by its name."""
     found = _ALWAYS | _COMMANDS[info.kind]
     if info.has_measurements:
-        dimensions = ("push", "time", "body", "pose")
         found["measured"] = Variable(
-            dimensions, "pose as it was captured", _POSE_QUANTITIES
+            _POSES, "pose as it was captured", _POSE_QUANTITIES
         )
     if info.has_repeats:
-        found["repeat"] = Variable(
-            _PUSH,
-            "pushes that were meant to be alike share it",
-            dtype=np.int32,
-            is_input=False,
-        )
+        meaning = "pushes that were meant to be alike share it"
+        found["repeat"] = _requested(_PUSH, meaning, dtype=np.int32)
     for engine in info.assumed_engines:
-        found[simulated_name(engine)] = Variable(
-            _MOTION,
-            f"s-bar: prediction of {engine}, assumed properties",
-            _MOTION_QUANTITIES,
-            is_input=False,
+        meaning = f"s-bar: prediction of {engine}, assumed properties"
+        found[simulated_name(engine)] = _requested(
+            _MOTIONS, meaning, _MOTION_QUANTITIES
         )
     for model in info.published:
-        found[published_name(model)] = Variable(
-            ("push", "body", "pose"),
-            f"final pose as published: {model}",
-            _POSE_QUANTITIES,
-            is_input=False,
-        )
+        meaning = f"final pose as published: {model}"
+        found[published_name(model)] = _requested(_POSE, meaning, _POSE_QUANTITIES)
     return found
 
 
