@@ -71,115 +71,6 @@ def make_problem(pushes: int = 100, steps: int = 200) -> Problem:
     return Problem(recipe, state, weights, even_batch(batch))
 
 
-_FORWARD_AND_BACK = 3  # a product's two gradients are two products of its size
-_log = logging.getLogger(__name__)
-
-
-class Measurement(NamedTuple):
-    """Times of one round of measurements."""
-
-    ceiling_gflops: float
-    iteration_ms: float
-    torch_ms: float | None
-
-
-class TrainingLoop:
-    """Training iterations on one batch, each from the state of the previous one."""
-
-    def __init__(self, problem: Problem) -> None:
-        """Compile and run the first iteration; `first_loss` is the loss before it."""
-        self._step = make_step(problem.recipe, problem.weights)
-        self._batch = problem.batch
-        # Match the step's output device; otherwise the second call compiles again.
-        state = jax.device_put(problem.state, jax.devices()[0])
-        self._state, loss = self._step(state, problem.batch)
-        self.first_loss = float(loss)
-
-    def advance(self) -> Any:  # noqa: ANN401
-        """Run one iteration and return its arrays."""
-        self._state, loss = self._step(self._state, self._batch)
-        return self._state, loss
-
-
-def bench_training(
-    runs: int = 5, *, pushes: int = 100, steps: int = 200, repeats: int = 5
-) -> Figures:
-    """Return the time of a training iteration of SAIN: gradient and Adam update.
-
-    Args:
-        runs: number of measurements, for the median.
-        pushes: pushes in the batch, with two disks each, robot setup.
-        steps: steps of each push, at most 200.
-        repeats: iterations per measurement, for its median.
-
-    Returns:
-        `iteration_ms`, `ceiling_fraction`, `eager_torch_ratio` and the sizes of the
-        measurement.
-
-    Raises:
-        SainetError: the first loss of PyTorch differs from ours.
-    """
-    check_runs(runs)
-    problem = make_problem(pushes, steps)
-    bodies = problem.batch.scene.body_count
-    work = counted_gflop(problem.state.network, pushes, steps, bodies)
-    loop = TrainingLoop(problem)
-    reason = missing_torch()
-    with TemporaryDirectory(prefix="sainet-bench-") as folder:
-        peer = None
-        if reason is None:
-            path = save_problem(Path(folder) / "problem.npz", problem)
-            peer = TorchPeer(path, loop.first_loss)
-        measured = [_measure(loop, peer, repeats) for _ in range(runs)]
-    return {
-        **_figures(measured, work),
-        "work_gflop": work,
-        "devices": jax.device_count(),
-        "runs": runs,
-        "reason": reason,
-    }
-
-
-def counted_gflop(
-    network: InteractionNetwork, pushes: int, steps: int, bodies: int
-) -> float:
-    """Return the operations in the matrix products of an iteration (1e9).
-
-    A linear layer with K inputs and N outputs costs ``2 K N`` per row, and twice as
-    much in the backward pass, without recomputed products. f_rel has one row for each
-    ordered pair of bodies, f_dyn one for each body.
-    """
-    pairs = bodies * (bodies - 1)
-    row = 2 * (pairs * _weights(network.rel) + bodies * _weights(network.dyn))
-    return _FORWARD_AND_BACK * row * pushes * steps / 1e9
-
-
-def _weights(layers: Any) -> int:  # noqa: ANN401
-    return sum(weight.size for weight in layers.weights)
-
-
-def _measure(loop: TrainingLoop, peer: TorchPeer | None, repeats: int) -> Measurement:
-    # In blocks with a warm-up each: NumPy's threads keep spinning for some milliseconds
-    # after a product and would slow down an iteration that follows immediately.
-    ceiling = ceiling_gflops()
-    ours = 1000 * median_seconds(loop.advance, repeats)
-    theirs = None if peer is None else peer.iteration_ms(repeats)
-    measurement = Measurement(ceiling, ours, theirs)
-    _log.info("%s", measurement)
-    return measurement
-
-
-def _figures(measured: list[Measurement], work: float) -> Figures:
-    fractions = [work / (m.iteration_ms / 1000 * m.ceiling_gflops) for m in measured]
-    ratios = [m.torch_ms / m.iteration_ms for m in measured if m.torch_ms is not None]
-    return {
-        "iteration_ms": median(m.iteration_ms for m in measured),
-        "ceiling_gflops": median(m.ceiling_gflops for m in measured),
-        "ceiling_fraction": median(fractions),
-        "eager_torch_ratio": median(ratios) if ratios else None,
-    }
-
-
 FOLDER = Path(__file__).resolve().parents[3] / "benchmarks"
 _SCRIPT = FOLDER / "torch_training.py"
 _PYTHON = FOLDER / ".venv" / "bin" / "python"
@@ -289,3 +180,112 @@ def _batch_arrays(problem: Problem) -> dict[str, Array]:
     }
     # Leave out the pushes that were repeated to make the batch even.
     return {name: value[:size] for name, value in arrays.items()}
+
+
+_FORWARD_AND_BACK = 3  # a product's two gradients are two products of its size
+_log = logging.getLogger(__name__)
+
+
+class Measurement(NamedTuple):
+    """Times of one round of measurements."""
+
+    ceiling_gflops: float
+    iteration_ms: float
+    torch_ms: float | None
+
+
+class TrainingLoop:
+    """Training iterations on one batch, each from the state of the previous one."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Compile and run the first iteration; `first_loss` is the loss before it."""
+        self._step = make_step(problem.recipe, problem.weights)
+        self._batch = problem.batch
+        # Match the step's output device; otherwise the second call compiles again.
+        state = jax.device_put(problem.state, jax.devices()[0])
+        self._state, loss = self._step(state, problem.batch)
+        self.first_loss = float(loss)
+
+    def advance(self) -> Any:  # noqa: ANN401
+        """Run one iteration and return its arrays."""
+        self._state, loss = self._step(self._state, self._batch)
+        return self._state, loss
+
+
+def bench_training(
+    runs: int = 5, *, pushes: int = 100, steps: int = 200, repeats: int = 5
+) -> Figures:
+    """Return the time of a training iteration of SAIN: gradient and Adam update.
+
+    Args:
+        runs: number of measurements, for the median.
+        pushes: pushes in the batch, with two disks each, robot setup.
+        steps: steps of each push, at most 200.
+        repeats: iterations per measurement, for its median.
+
+    Returns:
+        `iteration_ms`, `ceiling_fraction`, `eager_torch_ratio` and the sizes of the
+        measurement.
+
+    Raises:
+        SainetError: the first loss of PyTorch differs from ours.
+    """
+    check_runs(runs)
+    problem = make_problem(pushes, steps)
+    bodies = problem.batch.scene.body_count
+    work = counted_gflop(problem.state.network, pushes, steps, bodies)
+    loop = TrainingLoop(problem)
+    reason = missing_torch()
+    with TemporaryDirectory(prefix="sainet-bench-") as folder:
+        peer = None
+        if reason is None:
+            path = save_problem(Path(folder) / "problem.npz", problem)
+            peer = TorchPeer(path, loop.first_loss)
+        measured = [_measure(loop, peer, repeats) for _ in range(runs)]
+    return {
+        **_figures(measured, work),
+        "work_gflop": work,
+        "devices": jax.device_count(),
+        "runs": runs,
+        "reason": reason,
+    }
+
+
+def counted_gflop(
+    network: InteractionNetwork, pushes: int, steps: int, bodies: int
+) -> float:
+    """Return the operations in the matrix products of an iteration (1e9).
+
+    A linear layer with K inputs and N outputs costs ``2 K N`` per row, and twice as
+    much in the backward pass, without recomputed products. f_rel has one row for each
+    ordered pair of bodies, f_dyn one for each body.
+    """
+    pairs = bodies * (bodies - 1)
+    row = 2 * (pairs * _weights(network.rel) + bodies * _weights(network.dyn))
+    return _FORWARD_AND_BACK * row * pushes * steps / 1e9
+
+
+def _weights(layers: Any) -> int:  # noqa: ANN401
+    return sum(weight.size for weight in layers.weights)
+
+
+def _measure(loop: TrainingLoop, peer: TorchPeer | None, repeats: int) -> Measurement:
+    # In blocks with a warm-up each: NumPy's threads keep spinning for some milliseconds
+    # after a product and would slow down an iteration that follows immediately.
+    ceiling = ceiling_gflops()
+    ours = 1000 * median_seconds(loop.advance, repeats)
+    theirs = None if peer is None else peer.iteration_ms(repeats)
+    measurement = Measurement(ceiling, ours, theirs)
+    _log.info("%s", measurement)
+    return measurement
+
+
+def _figures(measured: list[Measurement], work: float) -> Figures:
+    fractions = [work / (m.iteration_ms / 1000 * m.ceiling_gflops) for m in measured]
+    ratios = [m.torch_ms / m.iteration_ms for m in measured if m.torch_ms is not None]
+    return {
+        "iteration_ms": median(m.iteration_ms for m in measured),
+        "ceiling_gflops": median(m.ceiling_gflops for m in measured),
+        "ceiling_fraction": median(fractions),
+        "eager_torch_ratio": median(ratios) if ratios else None,
+    }

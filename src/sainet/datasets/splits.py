@@ -122,7 +122,7 @@ def linked(store: Store) -> Int[np.ndarray, " push"]:
     names = ("initial", "truth", "pose_observed")
     arrays = store.read(slice(None), names)
     before = arrays["initial"][..., :3]
-    after = _last_poses(arrays["truth"], arrays["pose_observed"] > 0)
+    after = last_known(arrays["truth"][..., :3], arrays["pose_observed"] > 0)
     count = store.info.pushes
     _, first = np.unique(store.repeats(), return_inverse=True)
     ones, others = [np.arange(count)], [count + first]  # a node for each set of repeats
@@ -135,14 +135,13 @@ def linked(store: Store) -> Int[np.ndarray, " push"]:
     return connected_components(graph, directed=False)[1][:count]
 
 
-def _last_poses(
-    truth: Float[np.ndarray, "push time body 6"], known: Bool[np.ndarray, "push time"]
-) -> Float[np.ndarray, "push body 3"]:
-    """Return the last known poses; NaN, which equals nothing, where none is known."""
+def last_known(
+    values: Float[np.ndarray, "push time *rest"], known: Bool[np.ndarray, "push time"]
+) -> Float[np.ndarray, "push *rest"]:
+    """Return the last known values of each push; NaN where none is known."""
     last = known.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
-    pose = truth[np.arange(len(truth)), last, :, :3].copy()
-    pose[~np.asarray(known.any(axis=1))] = np.nan
-    return pose
+    is_known = known.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
+    return np.where(is_known, values[np.arange(len(values)), last], np.nan)
 
 
 def _is_same(

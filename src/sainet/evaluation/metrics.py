@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sainet.datasets.splits import last_known
 from sainet.evaluation.intervals import Folds, Interval, Sample
 
 REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
@@ -34,7 +35,7 @@ class Offsets:
 
     def last(self, values: np.ndarray) -> Float[np.ndarray, "push body"]:
         """Return the value at the last observed step of each push; NaN without any."""
-        return _last(values, self.observed)
+        return last_known(values, self.observed)
 
 
 MEASURED: Mapping[str, Callable[[Offsets], Float[np.ndarray, "push body"]]] = {
@@ -77,7 +78,7 @@ class Metric:
     key: str
     name: str
     unit: str
-    estimator: Callable[[ModelErrors], Interval]
+    estimator: Callable[[ModelErrors], Interval] | None = None  # None: the mean
     digits: int = 2  # after the point
     direction: Literal["less", "more"] = "less"  # is better
     is_of_end: bool = False  # of the end of a push, not of all its steps
@@ -87,23 +88,19 @@ class Metric:
         """The name with its unit."""
         return f"{self.name} ({self.unit})"
 
-
-def _mean(name: str) -> Callable[[ModelErrors], Interval]:
-    return lambda errors: errors.mean(name)
+    def of(self, errors: ModelErrors) -> Interval:
+        """Return the number of each body with its interval."""
+        return self.estimator(errors) if self.estimator else errors.mean(self.key)
 
 
 # In the order of JSON; tables have an order of their own.
 METRICS = {
     metric.key: metric
     for metric in (
-        Metric("pos_mm", "pos", "mm", _mean("pos_mm")),
-        Metric("rot_deg", "rot", "deg", _mean("rot_deg")),
-        Metric(
-            "final_pos_mm", "final pos", "mm", _mean("final_pos_mm"), is_of_end=True
-        ),
-        Metric(
-            "final_rot_deg", "final rot", "deg", _mean("final_rot_deg"), is_of_end=True
-        ),
+        Metric("pos_mm", "pos", "mm"),
+        Metric("rot_deg", "rot", "deg"),
+        Metric("final_pos_mm", "final pos", "mm", is_of_end=True),
+        Metric("final_rot_deg", "final rot", "deg", is_of_end=True),
         Metric(
             "relative_percent",
             "pos/travel",
@@ -159,14 +156,7 @@ def final_pose(
     pose: Float[np.ndarray, "push time body 3"], observed: Bool[np.ndarray, "push time"]
 ) -> Float[np.ndarray, "push body 3"]:
     """Return the last observed pose of each push; NaN if none was observed."""
-    return _last(pose, observed)
-
-
-def _last(values: np.ndarray, observed: np.ndarray) -> np.ndarray:
-    """Return the value at the last observed step of each push, else NaN."""
-    last = observed.shape[1] - 1 - np.argmax(observed[:, ::-1], axis=1)
-    is_known = observed.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
-    return np.where(is_known, values[np.arange(len(values)), last], np.nan)
+    return last_known(pose, observed)
 
 
 def _times(values: Interval, factor: float) -> Interval:

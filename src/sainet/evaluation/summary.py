@@ -213,7 +213,7 @@ class _Part:
     def rows(self, slug: str, *, with_intervals: bool) -> Iterator[Row]:
         """Yield the row of each body."""
         errors = self.models[slug]
-        found = {key: metric.estimator(errors) for key, metric in METRICS.items()}
+        found = {key: metric.of(errors) for key, metric in METRICS.items()}
         for body in range(self.bodies):
             yield Row(
                 condition=self.condition.label,

@@ -24,8 +24,6 @@ from sainet.models.inputs import (
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.scenes.state import pack_motion
 
-Error = Callable[[Array, Array], Array]  # of each body: predicted against true
-
 
 class LossWeights(eqx.Module):
     """Weights of the terms: the settings over the variance in the training data."""
@@ -35,6 +33,10 @@ class LossWeights(eqx.Module):
     velocity: Float[Array, ""]  # s^2/m^2
     spin: Float[Array, ""]  # s^2/rad^2
     linear_from: float = eqx.field(static=True, default=0.0)  # 0: nowhere
+
+
+# Of each body: predicted against true.
+Error = Callable[[Array, Array, LossWeights], Array]
 
 
 class Target(eqx.Module):
@@ -56,10 +58,10 @@ def push_losses(
     `weights.linear_from` counts by its error, not by the square of it.
     """
     pose = _masked_error(
-        predicted[..., 0:3], target.pose, target.pose_observed, _pose_error(weights)
+        predicted[..., 0:3], target.pose, target.pose_observed, _pose_error, weights
     )
     rate = _masked_error(
-        predicted[..., 3:6], target.rate, target.rate_observed, _rate_error(weights)
+        predicted[..., 3:6], target.rate, target.rate_observed, _rate_error, weights
     )
     return _linear_beyond(weights.linear_from, pose + rate)
 
@@ -71,32 +73,27 @@ def _linear_beyond(error: float, loss: Array) -> Array:
     return 2 * error**2 * (jnp.sqrt(1 + loss / error**2) - 1)
 
 
-def _pose_error(weights: LossWeights) -> Error:
-    def error(predicted: Array, true: Array) -> Array:
-        place = jnp.sum((predicted[..., 0:2] - true[..., 0:2]) ** 2, axis=-1)
-        sine = (jnp.sin(predicted[..., 2]) - jnp.sin(true[..., 2])) ** 2
-        cosine = (jnp.cos(predicted[..., 2]) - jnp.cos(true[..., 2])) ** 2
-        return weights.position * place + weights.rotation * (sine + cosine)
-
-    return error
+def _pose_error(predicted: Array, true: Array, weights: LossWeights) -> Array:
+    place = jnp.sum((predicted[..., 0:2] - true[..., 0:2]) ** 2, axis=-1)
+    sine = (jnp.sin(predicted[..., 2]) - jnp.sin(true[..., 2])) ** 2
+    cosine = (jnp.cos(predicted[..., 2]) - jnp.cos(true[..., 2])) ** 2
+    return weights.position * place + weights.rotation * (sine + cosine)
 
 
-def _rate_error(weights: LossWeights) -> Error:
-    def error(predicted: Array, true: Array) -> Array:
-        velocity = jnp.sum((predicted[..., 0:2] - true[..., 0:2]) ** 2, axis=-1)
-        spin = (predicted[..., 2] - true[..., 2]) ** 2
-        return weights.velocity * velocity + weights.spin * spin
-
-    return error
+def _rate_error(predicted: Array, true: Array, weights: LossWeights) -> Array:
+    velocity = jnp.sum((predicted[..., 0:2] - true[..., 0:2]) ** 2, axis=-1)
+    spin = (predicted[..., 2] - true[..., 2]) ** 2
+    return weights.velocity * velocity + weights.spin * spin
 
 
 def _masked_error(
-    predicted: Array, true: Array, observed: Array, error: Error
+    predicted: Array, true: Array, observed: Array, error: Error, weights: LossWeights
 ) -> Array:
     # The true value may be NaN where nothing was observed; replace it before it is
     # used, for zero times NaN is NaN in the gradient.
     known = jnp.broadcast_to(observed[..., None, None], true.shape)
-    errors = jnp.sum(error(predicted, jnp.where(known, true, predicted)), axis=-1)
+    true = jnp.where(known, true, predicted)
+    errors = jnp.sum(error(predicted, true, weights), axis=-1)
     count = jnp.maximum(jnp.sum(observed, axis=0), 1)
     return jnp.sum(jnp.where(observed, errors, 0.0), axis=0) / count
 

@@ -166,23 +166,24 @@ def episode_data(record: EpisodeRecord) -> dict[str, object]:
         "tolerance": record.tolerance_mm,
         "moved": record.moved,
         "bodies": [
-            _plane(frames.poses[:, body])
-            | {"angle": _numbers(np.deg2rad(frames.poses[:, body, 2]).round(5))}
+            plane(frames.poses[:, body])
+            | {"angle": numbers(np.deg2rad(frames.poses[:, body, 2]).round(5))}
             for body in range(frames.poses.shape[1])
         ],
-        "pusher": _plane(frames.pusher),
+        "pusher": plane(frames.pusher),
         "turns": [
-            {"start": start, "plan": [_plane(plan[:, i]) for i in range(plan.shape[1])]}
+            {"start": start, "plan": [plane(plan[:, i]) for i in range(plan.shape[1])]}
             for start, plan in zip(frames.starts, frames.plans, strict=True)
         ],
-        "distances": _numbers(frames.distances),
+        "distances": numbers(frames.distances),
     }
 
 
-def _plane(places: np.ndarray) -> dict[str, list[float | None]]:
-    return {name: _numbers(places[:, axis]) for axis, name in enumerate("xy")}
+def plane(places: np.ndarray) -> dict[str, list[float | None]]:
+    """Return x and y of places as JSON values."""
+    return {name: numbers(places[:, axis]) for axis, name in enumerate("xy")}
 
 
-def _numbers(values: Iterable[float]) -> list[float | None]:
+def numbers(values: Iterable[float]) -> list[float | None]:
     """Return numbers, with None for NaN and infinity, which JSON lacks."""
     return [float(value) if np.isfinite(value) else None for value in values]

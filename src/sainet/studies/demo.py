@@ -26,7 +26,7 @@ from sainet.report.pages.page import REPORT, Report, write_report
 from sainet.runs.documents import read_json, write_document
 from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST
-from sainet.scenes.state import State, Trajectory
+from sainet.scenes.state import State, Trajectory, pack_motion
 from sainet.studies import DemoConfig
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.runner import Runner
@@ -223,17 +223,13 @@ def _predict(model: Model, batch: PushBatch) -> Trajectory:
 
 def _track(trajectory: Trajectory, initial: State) -> Track:
     states = trajectory.states
-    pose = np.concatenate(
-        [np.asarray(states.position), np.asarray(states.angle)[..., None]], axis=-1
-    )
-    motion = _with_start(_pose(initial), pose)
+    motion = _with_start(_pose(initial), _pose(states))
     pusher = _with_start(initial.pusher_position, np.asarray(states.pusher_position))
     return Track(motion[..., :2], motion[..., 2], pusher)
 
 
 def _pose(state: State) -> np.ndarray:
-    angle = np.asarray(state.angle)[..., None]
-    return np.concatenate([np.asarray(state.position), angle], axis=-1)
+    return np.asarray(pack_motion(state)[..., :3])
 
 
 def _with_start(start: object, rest: np.ndarray) -> np.ndarray:

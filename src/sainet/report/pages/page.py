@@ -13,7 +13,7 @@ from markupsafe import Markup
 from sainet.control.record import EpisodeRecord
 from sainet.evaluation.summary import Summary
 from sainet.report.arrange import arrange
-from sainet.report.episode_frames import Replay, Track, episode_data
+from sainet.report.episode_frames import Replay, Track, episode_data, numbers, plane
 from sainet.report.pages import read, render
 from sainet.report.palette import css_variables, styles_of
 from sainet.report.writers import to_html
@@ -108,22 +108,15 @@ def replay_data(replay: Replay) -> dict[str, object]:
 
 
 def _bodies(track: Track) -> list[dict[str, list[float | None]]]:
+    angle = np.asarray(track.angle, float).round(_DECIMALS_RAD)
     return [
-        _plane(track.position[:, body])
-        | {"angle": _numbers(track.angle[:, body], _DECIMALS_RAD)}
-        for body in range(track.angle.shape[1])
+        _plane(track.position[:, body]) | {"angle": numbers(angle[:, body])}
+        for body in range(angle.shape[1])
     ]
 
 
 def _plane(position: np.ndarray) -> dict[str, list[float | None]]:
-    x, y = 1e3 * np.asarray(position, float).T
-    return {"x": _numbers(x, _DECIMALS_MM), "y": _numbers(y, _DECIMALS_MM)}
-
-
-def _numbers(values: np.ndarray, decimals: int) -> list[float | None]:
-    """Return rounded numbers, with None for NaN and infinity, which JSON lacks."""
-    rounded = np.round(np.asarray(values, float), decimals)
-    return [value if np.isfinite(value) else None for value in rounded.tolist()]
+    return plane((1e3 * np.asarray(position, float)).round(_DECIMALS_MM))
 
 
 def _pictures(figures: Sequence[tuple[Path | str, str]]) -> Iterator[dict[str, str]]:
