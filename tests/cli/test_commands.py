@@ -13,7 +13,7 @@ import pytest
 
 from sainet.cli import entry
 from sainet.cli.bench import Bench
-from sainet.cli.generate import Generate
+from sainet.cli.datasets import Generate
 from support import SOURCE
 
 SMALL = ["--pushes", "24", "--chunk-size", "12", "--workers", "1", "--quiet"]

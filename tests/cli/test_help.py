@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 
 from sainet.cli import entry
-from sainet.cli.generate import Settings
+from sainet.cli.datasets import Settings
 from sainet.cli.help import field_texts
 
 COMMANDS = [

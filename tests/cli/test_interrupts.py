@@ -7,7 +7,7 @@ import pytest
 
 from sainet import cli
 from sainet.cli import entry
-from sainet.cli.generate import Generate
+from sainet.cli.datasets import Generate
 from sainet.cli.output import Output, progress_bar
 from sainet.runs.interrupts import raise_if_interrupted, remembered_interrupts
 

@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from sainet.cli.generate import Generate
+from sainet.cli.datasets import Generate
 from sainet.cli.help import message
 from sainet.cli.train import Train
 from sainet.runs.errors import BadInput, BadSetting, unknown_name

@@ -1,4 +1,4 @@
-"""The command line: one thin file a subcommand, each calls one library function."""
+"""The command line: thin subcommands, each of which calls one library function."""
 
 import signal
 

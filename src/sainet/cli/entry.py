@@ -12,19 +12,16 @@ from tyro.conf import subcommand
 
 import sainet
 from sainet.cli.bench import Bench
-from sainet.cli.bystander import AddBystander
 from sainet.cli.control import Control
+from sainet.cli.datasets import AddBystander, Generate, Import, Split
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
-from sainet.cli.generate import Generate
 from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
-from sainet.cli.import_ import Import
 from sainet.cli.output import finish
 from sainet.cli.record import Record
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
-from sainet.cli.split import Split
 from sainet.cli.train import Train
 from sainet.cli.tune import Tune
 from sainet.runs.errors import BadInput, BadTable, SainetError
