@@ -90,6 +90,23 @@ def at_rest(
     )
 
 
+def in_a_row(radius: Float[Array | np.ndarray, "*batch body"]) -> State:
+    """Return disks at rest that touch, along the x axis, disk 1 at the origin.
+
+    Args:
+        radius: of each disk, m. NumPy's are added in their own precision.
+    """
+    xp = np if isinstance(radius, np.ndarray) else jnp
+    reach = xp.cumsum(radius[..., :-1] + radius[..., 1:], axis=-1)
+    x = xp.concatenate([xp.zeros_like(radius[..., :1]), reach], axis=-1)
+    behind = xp.stack([-2 * radius[..., 0], 0 * radius[..., 0]], axis=-1)
+    return at_rest(
+        jnp.asarray(xp.stack([x, 0 * x], axis=-1), jnp.float32),
+        jnp.zeros(radius.shape, jnp.float32),
+        jnp.asarray(behind, jnp.float32),
+    )
+
+
 def pack_motion(state: State) -> Float[Array, "*batch body 6"]:
     """Return x, y, angle and their rates of each disk in one array.
 
