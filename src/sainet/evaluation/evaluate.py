@@ -32,7 +32,7 @@ from sainet.evaluation.metrics import (
 )
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200

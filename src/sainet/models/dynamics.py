@@ -10,6 +10,7 @@ from jaxtyping import Array, Float
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors import AbstractCorrector, Purpose, Start
 from sainet.models.inputs import push_frame
+from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, unpack_motion
@@ -152,6 +153,34 @@ def stored_prediction(
     """
     pusher = controls.pusher_motion(initial.pusher_position)
     return Trajectory(unpack_motion(motion, *pusher))
+
+
+SAME_TIME = 1e-9  # s, difference below which time steps are equal
+
+
+def check_purpose(dynamics: AbstractDynamics, kind: str, time_step: float) -> None:
+    """Raise `BadCheckpoint` if a network is for another time step or other controls.
+
+    Its predictions would be wrong without any other sign.
+
+    Args:
+        dynamics: the model.
+        kind: setup of the pushes, `Controls.kind`.
+        time_step: of the scene, s.
+    """
+    made_for = dynamics.made_for
+    if made_for is None:
+        return
+    if made_for.kind != kind:
+        raise BadCheckpoint(
+            f"model: its network is for {made_for.kind} pushes, these are {kind} "
+            f"pushes; train a network on {kind} pushes."
+        )
+    if abs(made_for.time_step - time_step) > SAME_TIME:
+        raise BadCheckpoint(
+            f"model: its network has a time step of {made_for.time_step:g} s, the "
+            f"scene {time_step:g} s; give the scene the same time step."
+        )
 
 
 def predict(

@@ -20,7 +20,7 @@ from sainet.evaluation.measurements import (
     PublishedValues,
 )
 from sainet.models.identity import ModelId
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.steps import Join, Load, Step, Train
 from sainet.studies.study import Plan, Scope, Study
