@@ -1,0 +1,22 @@
+"""Datasets that the tests of the Python interface share."""
+
+import pytest
+
+from sainet import GenerateConfig, Pushes, generate, open_pushes
+
+SMALL = GenerateConfig(
+    pushes=12, chunk_size=12, stroke_mm=(2.0,), hold_steps=30, noise_level="none"
+)
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    """Twelve short simulated pushes of two disks, in a folder as the README names it."""
+    folder = tmp_path_factory.mktemp("api")
+    generate(SMALL, folder / "runs" / "recorded")
+    return folder
+
+
+@pytest.fixture
+def pushes(folder) -> Pushes:
+    return open_pushes(folder / "runs" / "recorded")
