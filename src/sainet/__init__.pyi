@@ -1,17 +1,20 @@
 """The public names and their homes, for type checkers and for `__init__.py`."""
 
+from sainet.api.engines import from_step as from_step
 from sainet.api.evaluating import evaluate as evaluate
+from sainet.api.functions import from_function as from_function
 from sainet.api.learning import identify as identify
 from sainet.api.learning import tune as tune
 from sainet.api.models import load as load
+from sainet.api.predictions import from_predictions as from_predictions
 from sainet.api.pushes import Pushes as Pushes
+from sainet.api.pushes import generate as generate
 from sainet.api.pushes import open_pushes as open_pushes
 from sainet.api.table import ErrorTable as ErrorTable
 from sainet.control.config import ControlConfig as ControlConfig
 from sainet.control.episode import run_episode as run_episode
 from sainet.control.trials import run_trials as run_trials
 from sainet.datasets.config import GenerateConfig as GenerateConfig
-from sainet.datasets.generate import generate as generate
 from sainet.datasets.store import open_store as open_store
 from sainet.engines import make_engine as make_engine
 from sainet.engines.base import (

@@ -1,13 +1,19 @@
 """Stored pushes in scripts: open, divide, read."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from weakref import finalize
 
 import numpy as np
 from jaxtyping import UInt64
 
+from sainet.api.progress import shown_progress
 from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate as simulate
 from sainet.datasets.splits import split
 from sainet.datasets.store import Store, open_store
 from sainet.runs.errors import require
@@ -22,6 +28,8 @@ class Pushes:
     """
 
     store: Store
+    # Deleted with the last pushes in it; None: a folder that stays.
+    folder: "TemporaryFolder | None" = field(default=None, repr=False, compare=False)
 
     def __len__(self) -> int:
         """Return the number of pushes."""
@@ -56,7 +64,7 @@ class Pushes:
         require(0 < test < 1, "test", "above 0 and below 1", test)
         require_count("seed", seed, low=0)
         training, tests = split(self.store, test, seed, chains=chains)
-        return Pushes(training), Pushes(tests)
+        return replace(self, store=training), replace(self, store=tests)
 
     def first(self, count: int) -> "Pushes":
         """Return only the first pushes.
@@ -64,7 +72,7 @@ class Pushes:
         Raises:
             BadInput: there are fewer.
         """
-        return Pushes(self.store.first(count))
+        return replace(self, store=self.store.first(count))
 
     def take(self, rows: Iterable[int]) -> "Pushes":
         """Return only the pushes with these indices, in this order.
@@ -72,7 +80,7 @@ class Pushes:
         Raises:
             BadInput: there is no push with one of them, or none was chosen.
         """
-        return Pushes(self.store.take(rows))
+        return replace(self, store=self.store.take(rows))
 
     def of_group(self, name: str) -> "Pushes":
         """Return the pushes of one group, a surface or a speed for example.
@@ -80,7 +88,7 @@ class Pushes:
         Raises:
             BadInput: there is no such group.
         """
-        return Pushes(self.store.of_group(name))
+        return replace(self, store=self.store.of_group(name))
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -106,6 +114,15 @@ class Pushes:
         return to_batch(self.store.read(slice(None)), self.store.info, steps=steps)
 
 
+class TemporaryFolder:
+    """A folder that is deleted with the last reference to it."""
+
+    def __init__(self) -> None:
+        """Make the folder."""
+        self.path = Path(mkdtemp(prefix="sainet-"))
+        finalize(self, rmtree, self.path, ignore_errors=True)
+
+
 Dataset = Pushes | Store | Path | str
 
 
@@ -120,6 +137,31 @@ def open_pushes(path: Path | str) -> Pushes:
         BadStore: the dataset is missing, unfinished, damaged or of another format.
     """
     return Pushes(open_store(path))
+
+
+def generate(
+    config: GenerateConfig,
+    out: Path | str | None = None,
+    *,
+    progress: bool | None = None,
+) -> Pushes:
+    """Simulate pushes of random scenes; equal settings give equal pushes.
+
+    Args:
+        config: number of pushes, disks, engine, noise, seed, ...
+        out: run folder; an identical call resumes or opens it. None: a temporary
+            folder, deleted with the last pushes in it.
+        progress: show a progress bar; None: on a terminal.
+
+    Raises:
+        RunConflict: the folder belongs to another run.
+        BadInput: a scene has no room for its disks, or an engine cannot have as many.
+    """
+    folder = TemporaryFolder() if out is None else None
+    path = folder.path if folder else Path(out or "")
+    with shown_progress("Simulating", config.pushes, progress) as advance:
+        store = simulate(config, path, on_pushes=lambda count: advance(count, ""))
+    return Pushes(store, folder)
 
 
 def store_of(pushes: Dataset) -> Store:

@@ -1,18 +1,23 @@
 """Errors of several models on the same pushes: verdict, rows, files."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from io import StringIO
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgspec.structs import astuple
 
+from sainet.evaluation.claims import TRUE_PROPERTIES, places
 from sainet.evaluation.measurements import Measurements
-from sainet.evaluation.summary import Row, Summary, summarise
+from sainet.evaluation.summary import BASELINE, Row, Summary, summarise
+from sainet.models.identity import NETWORKS
 from sainet.report import WRITERS
 from sainet.report.arrange import arrange
 from sainet.report.pages.page import Report, write_report
+from sainet.report.verdicts import worded_places
 from sainet.report.writers import print_table, to_html, write_table
 from sainet.runs.errors import require_one_of
 
@@ -49,15 +54,35 @@ class ErrorTable:
         return [{**_names(row), **_errors(row)} for row in found]
 
     def verdict(self) -> str:
-        """Return in a sentence how much less than physics the best model errs.
+        """Return in sentences which model errs less, clearly or not.
 
-        Of pushes in groups, a line for each. Without a model named `physics` in the
-        table there is nothing to compare with, and the sentence says that.
+        The best network beside physics; then each network beside physics that was
+        identified and beside models of your own. Of pushes in groups, for each group.
         """
-        found = arrange(self.summary).verdicts
+        found = [*arrange(self.summary).verdicts, *self._beside_others()]
         return "\n".join(found) or (
             "No verdict: it needs `physics` and another model in the table."
         )
+
+    def _beside_others(self) -> Iterator[str]:
+        """Yield in which errors networks are better or worse than other models."""
+        summary = self.summary
+        networks = [each.slug for each in summary.models if each.kind in NETWORKS]
+        others = [
+            each.slug
+            for each in summary.models
+            if each.kind == "physics" and each.slug not in (BASELINE, TRUE_PROPERTIES)
+        ]
+        for condition in summary.conditions:
+            where = f"{condition.label}: " if condition.label else ""
+            for pair in product(networks, others):
+                found = places(
+                    summary,
+                    *pair,
+                    metrics=("pos_mm", "rot_deg"),
+                    condition=condition.label,
+                )
+                yield f"{where}{worded_places(found, summary)}"
 
     def to_pandas(self) -> "DataFrame":
         """Return the rows as a pandas DataFrame."""

@@ -1,11 +1,13 @@
 """Dynamics models behind one `predict`: physics, a corrector, and both together."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 import jax
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, UInt64
 
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors import AbstractCorrector, Purpose, Start
@@ -17,6 +19,7 @@ from sainet.scenes.state import State, Trajectory, unpack_motion
 
 Carry = Any  # what a prediction continues from; each model has a type of its own
 Given = Trajectory | None  # a stored simulator prediction
+Hashes = UInt64[np.ndarray, " push"]
 
 
 class AbstractDynamics(eqx.Module):
@@ -38,6 +41,23 @@ class AbstractDynamics(eqx.Module):
     @property
     def made_for(self) -> Purpose | None:
         """The pushes that its corrector is for; None without a corrector."""
+        return None
+
+    def recall(
+        self, hashes: Callable[[], Hashes], steps: int, bodies: int
+    ) -> np.ndarray | None:
+        """Return predictions of stored pushes that were made elsewhere.
+
+        Args:
+            hashes: returns the hash of each push.
+            steps: of the longest push.
+            bodies: of each push.
+
+        Returns:
+            Poses (m, m, rad) [push, time, body, 3], or final ones [push, body, 3]; None
+            for a model that predicts here.
+        """
+        del hashes, steps, bodies
         return None
 
     @abstractmethod

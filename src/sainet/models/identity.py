@@ -7,6 +7,7 @@ import msgspec
 from sainet.engines.simulator import (
     PAPER,
     TRUE_PROPERTIES,
+    OwnSpec,
     SimulatorSpec,
 )
 
@@ -64,6 +65,8 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     def _simulator_part(self) -> str:
         if self.simulator is None or self.kind == "in":
             return ""
+        if isinstance(self.simulator, OwnSpec):
+            return self.simulator.name
         if self.simulator.assumptions == TRUE_PROPERTIES:
             return "true"
         if self.simulator.assumptions != PAPER:
