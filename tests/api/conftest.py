@@ -11,7 +11,7 @@ SMALL = GenerateConfig(
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """Twelve short simulated pushes of two disks, in a folder as the README names it."""
+    """Twelve short simulated pushes of two disks, where the program looks for them."""
     folder = tmp_path_factory.mktemp("api")
     generate(SMALL, folder / "runs" / "recorded")
     return folder

@@ -23,25 +23,33 @@ Folder = PathLike[str] | str
 
 
 def identify(
-    pushes: Dataset, *, out: Folder | None = None, progress: bool | None = None
+    pushes: Dataset,
+    *,
+    engine: Loadable = "planar",
+    out: Folder | None = None,
+    progress: bool | None = None,
 ) -> Model:
     """Estimate frictions, pressure distribution and camera offset from pushes.
 
     Args:
         pushes: along paths, observed at least at their ends.
+        engine: the planar engine, or one of your own in JAX (`from_step`): of that,
+            frictions and camera offset are estimated, as far as its step depends on
+            the frictions of the scene. Engines outside JAX have no derivatives.
         out: run folder to write, which commands take as a model; None: no files.
         progress: show a progress bar; None: on a terminal.
 
     Returns:
-        The planar engine with the estimated parameters, as a model. `identified` has
+        The engine with the estimated parameters, as a model. `identified` has
         the estimates with 95 % intervals, and which are not identifiable: these keep
         their initial values.
 
     Raises:
         BadStore: no pose was observed, or forces drive the pusher.
+        BadInput: the engine has no derivatives.
         RunConflict: the folder belongs to another run.
     """
-    store = store_of(pushes)
+    store, simulator = store_of(pushes), _internal(engine).simulator
     title = f"Fitting to {store.info.pushes} pushes"
     with shown_progress(title, None, progress) as advance:
 
@@ -49,9 +57,9 @@ def identify(
             advance(1, f"error {error:.3f}")
 
         if out is not None:
-            identify_into(store, Path(out), on_try=on_try)
+            identify_into(store, Path(out), simulator=simulator, on_try=on_try)
             return load(out)
-        return identified_physics(estimate(store, on_try=on_try))
+        return identified_physics(estimate(store, simulator, on_try=on_try))
 
 
 def tune(
