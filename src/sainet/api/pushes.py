@@ -36,11 +36,11 @@ class Pushes:
         return self.store.info.pushes
 
     def __repr__(self) -> str:
-        """Return number, kind and dataset in one line."""
+        """Return number, disks, origin and dataset in one line."""
         info = self.store.info
         kind = "recorded" if info.is_recorded else f"simulated by {info.engine}"
         disks = f"{info.bodies} disk{'s' * (info.bodies > 1)}"
-        return f"<{len(self)} {kind} pushes of {disks}: {self.store.path}>"
+        return f"<{len(self)} pushes of {disks}, {kind}: {self.store.path}>"
 
     def split(
         self, test: float = 0.2, seed: int = 0, *, chains: bool = False

@@ -1,7 +1,7 @@
 """Errors of several models on the same pushes: verdict, rows, files."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from io import StringIO
 from itertools import product
@@ -17,6 +17,7 @@ from sainet.models.identity import NETWORKS
 from sainet.report import WRITERS
 from sainet.report.arrange import arrange
 from sainet.report.pages.page import Report, write_report
+from sainet.report.table import Table
 from sainet.report.verdicts import worded_places
 from sainet.report.writers import print_table, to_html, write_table
 from sainet.runs.errors import require_one_of
@@ -42,6 +43,12 @@ class ErrorTable:
         """Means with intervals, and paired comparisons."""
         return summarise(self.measured)
 
+    @cached_property
+    def content(self) -> Table:
+        """The cells of the table, comparisons and verdicts."""
+        found = arrange(self.summary)
+        return replace(found, verdicts=(*found.verdicts, *self._beside_others()))
+
     @property
     def rows(self) -> list[dict[str, str | float | None]]:
         """One row for each model and disk.
@@ -59,8 +66,7 @@ class ErrorTable:
         The best network beside physics; then each network beside physics that was
         identified and beside models of your own. Of pushes in groups, for each group.
         """
-        found = [*arrange(self.summary).verdicts, *self._beside_others()]
-        return "\n".join(found) or (
+        return "\n".join(self.content.verdicts) or (
             "No verdict: it needs `physics` and another model in the table."
         )
 
@@ -104,7 +110,7 @@ class ErrorTable:
         path = Path(path)
         require_one_of("path", path.suffix, WRITERS)
         if path.suffix != _PAGE:
-            write_table(arrange(self.summary), path)
+            write_table(self.content, path)
             return path
         pushes = len(self.measured.data["row"])
         about = Report(
@@ -120,16 +126,15 @@ class ErrorTable:
         from rich.console import Console
 
         text = StringIO()
-        print_table(
-            arrange(self.summary), Console(file=text, width=_WIDTH, highlight=False)
-        )
+        console = Console(file=text, width=_WIDTH, highlight=False)
+        print_table(self.content, console)
         return text.getvalue().rstrip()
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
         """Return the table for notebooks."""
-        return to_html(arrange(self.summary))
+        return to_html(self.content)
 
 
 def _names(row: Row) -> dict[str, str | float | None]:

@@ -79,7 +79,13 @@ def at_rest(
     angle: Float[Array, "*batch body"],
     pusher_position: Float[Array, "*batch 2"],
 ) -> State:
-    """Return the state at rest with the given poses."""
+    """Return the state at rest with the given poses.
+
+    Args:
+        position: of the disks, m.
+        angle: of the disks, rad.
+        pusher_position: m.
+    """
     return State(
         position=position,
         angle=angle,
