@@ -11,8 +11,9 @@ from typing import Any
 
 __version__ = "0.1.0"
 
+# Each public name with its module and its name there.
 _HOMES = {
-    alias.name: node.module
+    alias.asname or alias.name: (node.module, alias.name)
     for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text("utf-8")).body
     if isinstance(node, ast.ImportFrom) and node.module
     for alias in node.names
@@ -24,4 +25,10 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401
     """Load a public name from its home when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'sainet' has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    module, attribute = _HOMES[name]
+    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    """Return the public names, so that editors complete them."""
+    return [*__all__, "__version__"]

@@ -1,10 +1,20 @@
 """The public names and their homes, for type checkers and for `__init__.py`."""
 
+from sainet.api.engines import from_step as from_step
+from sainet.api.evaluating import evaluate as evaluate
+from sainet.api.functions import from_function as from_function
+from sainet.api.learning import identify as identify
+from sainet.api.learning import tune as tune
+from sainet.api.models import load as load
+from sainet.api.predictions import from_predictions as from_predictions
+from sainet.api.pushes import Pushes as Pushes
+from sainet.api.pushes import generate as generate
+from sainet.api.pushes import open_pushes as open_pushes
+from sainet.api.table import ErrorTable as ErrorTable
 from sainet.control.config import ControlConfig as ControlConfig
 from sainet.control.episode import run_episode as run_episode
 from sainet.control.trials import run_trials as run_trials
 from sainet.datasets.config import GenerateConfig as GenerateConfig
-from sainet.datasets.generate import generate as generate
 from sainet.datasets.store import open_store as open_store
 from sainet.engines import make_engine as make_engine
 from sainet.engines.base import (
@@ -14,8 +24,6 @@ from sainet.engines.base import (
     AssumedProperties as AssumedProperties,
 )
 from sainet.engines.planar.engine import PlanarEngine as PlanarEngine
-from sainet.evaluation.evaluate import evaluate as evaluate
-from sainet.identification.identify import identify as identify
 from sainet.learning.fit import fit as fit
 from sainet.learning.recipes import Recipe as Recipe
 from sainet.learning.recipes import recipe_for as recipe_for
@@ -29,8 +37,8 @@ from sainet.models.dynamics import (
     predict as predict,
 )
 from sainet.models.identity import ModelId as ModelId
-from sainet.models.library import Model as Model
 from sainet.models.library import load_model as load_model
+from sainet.models.model import Model as Model
 from sainet.planning import make_planner as make_planner
 from sainet.scenes.controls import (
     ForceControls as ForceControls,

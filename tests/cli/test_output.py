@@ -4,7 +4,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from sainet.cli.output import Bars, Output, Pace, progress_bar
+from sainet.cli.output import Bars, Output, progress_bar
+from sainet.runs.progress import Pace
 from sainet.studies.runner import Progress
 
 PATH = "runs/[test]/[/test]/" + "a" * 80

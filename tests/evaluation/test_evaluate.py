@@ -26,7 +26,8 @@ from sainet.evaluation.joining import pool_trainings
 from sainet.evaluation.summary import summarise
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
 from sainet.models.identity import ModelId
-from sainet.models.library import Model, load_model
+from sainet.models.library import load_model
+from sainet.models.model import Model
 from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, Diverged, UnknownName
 from sainet.scenes.recording import CameraOffset

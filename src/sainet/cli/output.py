@@ -2,14 +2,14 @@
 
 import json
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from sainet.runs.interrupts import raise_if_interrupted
+from sainet.runs import progress
+from sainet.runs.progress import COMPILING, Advance
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -59,76 +59,11 @@ def finish(result: Json, output: Output) -> None:
         sys.stdout.flush()
 
 
-Advance = Callable[[int, str], None]  # number of finished units, and a note
-COMPILING = "compiling"
-
-
-@dataclass
-class Pace:
-    """Rate of the units after the first report, whose time includes compilation."""
-
-    begun: float | None = None  # s, time of the first report
-    counted: int = 0  # units since then
-
-    def add(self, units: int) -> float | None:
-        """Count units; returns units per second, None until two reports."""
-        now = time.perf_counter()
-        if self.begun is None:
-            self.begun = now if units else None
-            return None
-        self.counted += units
-        return self.counted / (now - self.begun) if self.counted else None
-
-
-@contextmanager
 def progress_bar(
     title: str, total: int | None, output: Output, *, waiting: str = COMPILING
-) -> Iterator[Advance]:
-    """Show a progress bar and yield the function that advances it.
-
-    Args:
-        title: text before the bar.
-        total: number of units; None where it is unknown.
-        output: `quiet` shows nothing.
-        waiting: note until the first units are finished; the bar pulses meanwhile.
-    """
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}", style="cyan"),
-        TimeRemainingColumn(elapsed_when_finished=True),
-        TextColumn("{task.fields[note]}", markup=False),
-    )
-    bar = Progress(*columns, console=Console(stderr=True), disable=output.quiet)
-    pace = Pace()
-    with bar:
-        task = bar.add_task(title, total=None, note=waiting, rate="")
-
-        def advance(amount: int, note: str = "") -> None:
-            raise_if_interrupted()
-            rate = pace.add(amount)
-            begun = pace.begun is not None
-            bar.update(
-                task,
-                advance=amount,
-                total=total if begun else None,
-                note=note if begun else note or waiting,
-                rate="" if rate is None else f"{rate:.1f}/s",
-            )
-
-        yield advance
-        if pace.begun is None:  # everything was finished before
-            bar.update(task, total=total, completed=total or 0, note="")
+) -> AbstractContextManager[Advance]:
+    """Return a progress bar that `quiet` hides; see `runs.progress`."""
+    return progress.progress_bar(title, total, quiet=output.quiet, waiting=waiting)
 
 
 class Bars:

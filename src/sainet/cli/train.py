@@ -89,28 +89,21 @@ class Job:
         use_devices(devices)
         from sainet.datasets.store import open_store
         from sainet.learning.fit import fit
-        from sainet.learning.log import loss_note
+        from sainet.learning.log import reported
         from sainet.report.figures.curves import draw_history
 
         store = open_store(self.data)
         store = store if self.group is None else store.of_group(self.group)
         store = store if self.pushes is None else store.first(self.pushes)
-        done, name = 0, self.model.upper()
-        total = recipe.optimiser.iterations
+        name, total = self.model.upper(), recipe.optimiser.iterations
         with progress_bar(f"Training {name}", total, output) as advance:
-
-            def on_step(iteration: int, loss: float | None) -> None:
-                nonlocal done
-                advance(iteration - done, loss_note(loss))
-                done = iteration
-
             result = fit(
                 self.model,
                 store,
                 recipe,
                 self.out,
                 assumed_engine=self.engine,
-                on_step=on_step,
+                on_step=reported(advance),
             )
         curve = draw_history(
             self.model, result.history, self.out / "learning-curve.svg"

@@ -31,7 +31,8 @@ from sainet.control.config import CollectConfig
 from sainet.control.episode import MOST_TROUBLES, checked
 from sainet.control.trial import assumed_frictions
 from sainet.datasets.store import Store, open_store
-from sainet.models.library import Model, load_model
+from sainet.models.library import load_model
+from sainet.models.model import Model
 from sainet.planning import make_planner
 from sainet.robots import make_robot
 from sainet.robots.base import AbstractRobot
@@ -260,8 +261,8 @@ def _random_push(rng: np.random.Generator) -> Push:
     """Return a push with the paper's distributions of angles."""
     grid = PushGrid()
     return Push(
-        contact_angle=jnp.float32(rng.uniform(-1, 1) * grid.contact_range),
-        direction=jnp.float32(rng.uniform(-1, 1) * grid.direction_range),
-        length=jnp.float32(grid.length),
-        speed=jnp.float32(grid.speed),
+        contact_angle=rng.uniform(-1, 1) * grid.contact_range,
+        direction=rng.uniform(-1, 1) * grid.direction_range,
+        length=grid.length,
+        speed=grid.speed,
     )

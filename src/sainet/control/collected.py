@@ -47,8 +47,7 @@ class Command(msgspec.Struct, frozen=True, kw_only=True):
 
     def push(self) -> Push:
         """Return the push."""
-        fields = msgspec.structs.asdict(self)
-        return Push(**{name: jnp.float32(value) for name, value in fields.items()})
+        return Push(**msgspec.structs.asdict(self))
 
 
 class Place(msgspec.Struct, frozen=True, kw_only=True):

@@ -23,7 +23,8 @@ from sainet.control.trial import make_trial
 from sainet.engines import make_engine
 from sainet.evaluation.measurements import Condition, Header, Measurements
 from sainet.models.identity import ModelId
-from sainet.models.library import Model, load_model
+from sainet.models.library import load_model
+from sainet.models.model import Model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document

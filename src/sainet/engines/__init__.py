@@ -17,6 +17,9 @@ ENGINES = {
 def make_engine(name: str) -> "AbstractEngine":
     """Return a new engine with its default settings.
 
+    Args:
+        name: planar or bullet.
+
     Raises:
         UnknownName: no engine has this name.
         MissingExtra: the engine needs a package that is not installed.

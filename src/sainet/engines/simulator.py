@@ -7,17 +7,17 @@ JAX until then.
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import msgspec
 
 from sainet.runs.documents import content_hash
-from sainet.runs.errors import unknown_name
+from sainet.runs.errors import UnknownName, unknown_name
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
 from sainet.scenes.recording import AGREES, CameraOffset
 
 if TYPE_CHECKING:
-    from sainet.engines.base import AssumedProperties
+    from sainet.engines.base import AbstractEngine, AssumedProperties
 
 UNIFORM_PRESSURE = (
     2 / 3
@@ -113,7 +113,40 @@ class BulletSpec(_Spec, frozen=True, kw_only=True, tag="bullet"):
         return AssumedProperties(BulletEngine(), self.assumptions)
 
 
-SimulatorSpec = PlanarSpec | BulletSpec
+class OwnSpec(_Spec, frozen=True, kw_only=True, tag="own"):
+    """An engine of a user's script, which registers it under a name.
+
+    A document contains the name only: opening one never runs code that it names.
+    """
+
+    name: Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,49}$")]
+    assumptions: Assumptions = Assumptions()
+
+    engine: ClassVar[str] = "own"
+
+    @property
+    def is_identified(self) -> bool:
+        """False: its parameters are in the script."""
+        return False
+
+    def build(self) -> "AssumedProperties":
+        """Return the engine with its assumptions.
+
+        Raises:
+            UnknownName: no engine was registered under the name.
+        """
+        from sainet.engines.base import AssumedProperties
+
+        if self.name not in OWN:
+            raise UnknownName(
+                f"No engine named '{self.name}' was made in this process; call "
+                f"`from_step` with name='{self.name}' first."
+            )
+        return AssumedProperties(OWN[self.name], self.assumptions)
+
+
+SimulatorSpec = PlanarSpec | BulletSpec | OwnSpec
+OWN: "dict[str, AbstractEngine]" = {}  # engines that scripts registered
 
 
 class InternalEngine(msgspec.Struct, frozen=True):

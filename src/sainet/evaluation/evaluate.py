@@ -30,12 +30,14 @@ from sainet.evaluation.metrics import (
     push_errors,
     travel_mm,
 )
+from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200
+OnPushes = Callable[[str, int], None]  # called with a model and its new predictions
 _BATCH = 256  # pushes that are predicted at a time: one compilation for each length
 
 
@@ -45,7 +47,7 @@ def evaluate(
     *,
     steps: int | None = None,
     force: bool = False,
-    on_pushes: Callable[[str, int], None] = lambda model, pushes: None,
+    on_pushes: OnPushes = lambda model, pushes: None,
 ) -> Measurements:
     """Predict every stored push with every model and measure the errors.
 
@@ -63,16 +65,15 @@ def evaluate(
     """
     names = [model.name for model in models]
     if len(set(names)) < len(names):
-        raise BadInput(
-            f"`model`: {', '.join(names)} are not all different; rename one."
-        )
+        every = ", ".join(names)
+        raise BadInput(f"`model`: {every} are not all different; rename one.")
     info = store.info
     trained = any(model.card is not None for model in models)
     hashes = store.push_hashes() if trained and not force else None
     for model in () if force else models:
         model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
     pushes = _Pushes(store, _limit(store, steps))
-    errors = [pushes.errors(_predict_all(m, pushes, on_pushes)) for m in models]
+    errors = [_errors(model, pushes, on_pushes) for model in models]
     return _measurements(models, pushes, errors)
 
 
@@ -168,9 +169,7 @@ class _Pushes:
         """Return the errors of the predicted poses of each part."""
         pairs = zip(poses, self.truths(), strict=True)
         found = [push_errors(predicted, *truth) for predicted, truth in pairs]
-        return {
-            name: self.in_order([each[name] for each in found]) for name in MEASURED
-        }
+        return {name: self.in_order([e[name] for e in found]) for name in MEASURED}
 
 
 def _limit(store: Store, steps: int | None) -> int:
@@ -184,8 +183,19 @@ def _limit(store: Store, steps: int | None) -> int:
     return steps or store.info.steps
 
 
+def _errors(model: Model, pushes: _Pushes, on_pushes: OnPushes) -> Errors:
+    store, longest = pushes.store, max(steps for _, steps in pushes.parts)
+    given = model.dynamics.recall(store.push_hashes, longest, store.info.bodies)
+    if given is None:
+        return pushes.errors(_predict_all(model, pushes, on_pushes))
+    on_pushes(model.name, len(given))
+    if given.ndim == pushes.final.ndim:
+        return final_errors(given, pushes.final)
+    return pushes.errors([given[part, :steps] for part, steps in pushes.parts])
+
+
 def _predict_all(
-    model: Model, pushes: _Pushes, on_pushes: Callable[[str, int], None]
+    model: Model, pushes: _Pushes, on_pushes: OnPushes
 ) -> list[np.ndarray]:
     """Return the predicted poses of each part, ``[push, time, body, 3]``."""
     store, arrays = pushes.store, pushes.arrays
@@ -274,16 +284,14 @@ def _header(models: Sequence[Model], store: Store, labels: Sequence[str]) -> Hea
         reference_m=REFERENCE_DISTANCE[kind],
         provenance=Provenance(
             tests=tuple(TestSet(condition=c, data=store.content) for c in labels),
-            trainings=tuple(map(_training, filter(lambda m: m.card, models))),
+            trainings=tuple(_training(m.name, m.card) for m in models if m.card),
         ),
     )
 
 
-def _training(model: Model) -> TrainingRun:
-    assert model.card is not None
-    card = model.card
+def _training(name: str, card: Card) -> TrainingRun:
     return TrainingRun(
-        model=model.name,
+        model=name,
         seed=card.recipe.seed,
         weights=card.weights,
         data=card.data,

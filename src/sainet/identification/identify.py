@@ -6,13 +6,17 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
+from msgspec import to_builtins
 from scipy.optimize import least_squares
 
 from sainet.datasets.store import Store
+from sainet.engines.simulator import SimulatorSpec
 from sainet.identification.parameters import (
     BOUNDS,
     FRICTIONS,
     NAMES,
+    PLANAR,
+    Own,
     bounds_of,
     doubt,
     from_coordinate,
@@ -32,7 +36,7 @@ from sainet.identification.residuals import (
 )
 from sainet.models.card import IDENTIFIED, Estimate, Identified, read_identified
 from sainet.runs.documents import write_document
-from sainet.runs.errors import BadStore
+from sainet.runs.errors import BadInput, BadStore
 from sainet.runs.folders import open_run
 
 Try = Callable[[float], None]  # called with the root mean square of all errors
@@ -82,13 +86,18 @@ _log = logging.getLogger(__name__)
 
 
 def identify_into(
-    store: Store, out: Path, *, on_try: Try = lambda error: None
+    store: Store,
+    out: Path,
+    *,
+    simulator: SimulatorSpec = PLANAR,
+    on_try: Try = lambda error: None,
 ) -> Identified:
     """Return the parameters in a run folder, identified there if it is unfinished.
 
     Args:
         store: see `identify`.
         out: the run folder.
+        simulator: see `identify`.
         on_try: see `identify`.
 
     Raises:
@@ -97,10 +106,12 @@ def identify_into(
         BadInput: the folder is finished but damaged.
     """
     settings = {"command": "identify", "data": store.content, "parameters": NAMES}
+    if simulator != PLANAR:
+        settings["engine"] = to_builtins(simulator)
     check_store(store)
     folder = open_run(out, settings, finished_by=IDENTIFIED)
     if not folder.is_finished:
-        write_document(out / IDENTIFIED, identify(store, on_try=on_try))
+        write_document(out / IDENTIFIED, identify(store, simulator, on_try=on_try))
     return read_identified(out)
 
 
@@ -121,7 +132,12 @@ def check_store(store: Store) -> None:
             )
 
 
-def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
+def identify(
+    store: Store,
+    simulator: SimulatorSpec = PLANAR,
+    *,
+    on_try: Try = lambda error: None,
+) -> Identified:
     """Return estimates of frictions, pressure distribution and camera offset.
 
     Nonlinear least squares (SciPy, robust against outliers) on the position and
@@ -132,16 +148,19 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
 
     Args:
         store: pushes along paths, with observed final poses at least.
+        simulator: planar, or an engine of the user's own in JAX, of which frictions and
+            camera offset are estimated.
         on_try: called with the root mean square error of each trial solution; about 1
             at the start.
 
     Raises:
         BadStore: no pose was observed, or forces drive the pusher.
+        BadInput: the engine does not run in JAX, so that it has no derivatives.
     """
     check_store(store)
-    parts = samples(store)
+    parts = samples(store, _own_engine(simulator))
     scenes = [part.batch.scene for part in parts]
-    start = starting_values(scenes, names_for(scenes[0]))
+    start = starting_values(scenes, names_for(scenes[0], simulator))
     _tell_of_one_value(store, start)
     before, scale = _mean_errors(start, parts), _scale(start, parts)
     values, known, doubtful = start, {}, {}
@@ -156,7 +175,7 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
         doubtful, values = doubtful | new, start
     after = _mean_errors(values, parts)
     return Identified(
-        engine=to_engine(values),
+        engine=to_engine(values, simulator),
         estimates=tuple(
             _estimate(name, values[name], start[name], known, doubtful)
             for name in start
@@ -167,6 +186,19 @@ def identify(store: Store, *, on_try: Try = lambda error: None) -> Identified:
         before_deg=before[1],
         after_deg=after[1],
     )
+
+
+def _own_engine(simulator: SimulatorSpec) -> Own:
+    """Return an engine of the user's own; None for the planar engine."""
+    if simulator.engine == PLANAR.engine:
+        return None
+    engine = simulator.build().engine
+    if engine.on_host:
+        raise BadInput(
+            "`engine` does not run in JAX and has no derivatives, so that no "
+            "parameter can be identified; estimate its parameters yourself."
+        )
+    return engine
 
 
 def _tell_of_one_value(store: Store, start: Mapping[str, float]) -> None:
@@ -192,7 +224,7 @@ def _estimate(
 
 def _raw_errors(values: Mapping[str, float], part: Sample) -> np.ndarray:
     tree = {name: jnp.float32(value) for name, value in values.items()}
-    return np.asarray(pose_errors(tree, part.batch, jnp.asarray(part.steps)))
+    return np.asarray(pose_errors(tree, *part.inputs))
 
 
 def _scale(values: Mapping[str, float], parts: Sequence[Sample]) -> Scale:

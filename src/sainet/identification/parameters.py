@@ -7,17 +7,22 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from msgspec.structs import replace
 
+from sainet.engines.base import AbstractEngine
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.simulator import (
     UNIFORM_PRESSURE,
     Assumptions,
     InternalEngine,
     PlanarSpec,
+    SimulatorSpec,
 )
 from sainet.scenes.recording import CameraOffset
 from sainet.scenes.scene import Scene
 
+Own = AbstractEngine | None
+PLANAR = PlanarSpec()
 FRICTIONS = ("pusher_friction", "disk_friction", "table_friction")
 RATIO = "pressure_radius_ratio"
 CAMERA = ("camera_x_mm", "camera_y_mm")  # camera-measured minus robot-measured position
@@ -73,10 +78,14 @@ def doubt(name: str, value: float, low: float, high: float) -> str | None:
     return None
 
 
-def names_for(scene: Scene) -> tuple[str, ...]:
-    """Return the parameters that affect a scene: one disk has no disk friction."""
-    lone = scene.body_count == 1
-    return tuple(name for name in NAMES if not (lone and name == "disk_friction"))
+def names_for(scene: Scene, simulator: SimulatorSpec = PLANAR) -> tuple[str, ...]:
+    """Return the parameters that affect a scene: one disk has no disk friction.
+
+    The pressure distribution is a parameter of the planar engine only.
+    """
+    lone = ("disk_friction",) if scene.body_count == 1 else ()
+    absent = lone if simulator.engine == PlanarSpec.engine else (*lone, RATIO)
+    return tuple(name for name in NAMES if name not in absent)
 
 
 def starting_values(
@@ -96,18 +105,23 @@ def _mean(parts: Sequence[Float[Array, " push"]]) -> float:
 
 
 def with_values(
-    scene: Scene, values: Mapping[str, Float[Array, ""]]
-) -> tuple[Scene, PlanarEngine]:
-    """Return scenes and an engine with these values, differentiable by the values."""
+    scene: Scene, values: Mapping[str, Float[Array, ""]], own: Own = None
+) -> tuple[Scene, AbstractEngine]:
+    """Return scenes and an engine with these values, differentiable by the values.
+
+    Args:
+        scene: of each push.
+        values: by the names of the parameters.
+        own: an engine of the user's own; None: the planar engine.
+    """
     frictions = [name for name in FRICTIONS if name in values]
     changed = eqx.tree_at(
         lambda s: [getattr(s, name) for name in frictions],
         scene,
         [jnp.broadcast_to(values[n], getattr(scene, n).shape) for n in frictions],
     )
-    return changed, PlanarEngine(
-        pressure_radius_ratio=values.get(RATIO, UNIFORM_PRESSURE)
-    )
+    ratio = values.get(RATIO, UNIFORM_PRESSURE)
+    return changed, own or PlanarEngine(pressure_radius_ratio=ratio)
 
 
 def camera_at(values: Mapping[str, Float[Array, ""]]) -> Float[Array, "2"]:
@@ -115,7 +129,9 @@ def camera_at(values: Mapping[str, Float[Array, ""]]) -> Float[Array, "2"]:
     return jnp.stack([values.get(name, jnp.zeros(())) for name in CAMERA]) / 1000
 
 
-def to_engine(values: Mapping[str, float]) -> InternalEngine:
+def to_engine(
+    values: Mapping[str, float], simulator: SimulatorSpec = PLANAR
+) -> InternalEngine:
     """Return the engine with estimated parameters; masses and radii are the scene's."""
     x, y = (values.get(name, 0.0) / 1000 for name in CAMERA)
     assumptions = Assumptions(
@@ -123,6 +139,7 @@ def to_engine(values: Mapping[str, float]) -> InternalEngine:
         disk_friction=values.get("disk_friction"),
         table_friction=values.get("table_friction"),
     )
-    ratio = values.get(RATIO, UNIFORM_PRESSURE)
-    simulator = PlanarSpec(assumptions=assumptions, pressure_radius_ratio=ratio)
-    return InternalEngine(simulator, CameraOffset(x=x, y=y))
+    found = replace(simulator, assumptions=assumptions)
+    if RATIO in values:
+        found = replace(found, pressure_radius_ratio=values[RATIO])
+    return InternalEngine(found, CameraOffset(x=x, y=y))

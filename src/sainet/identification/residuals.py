@@ -16,6 +16,7 @@ from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.identification.parameters import (
     BOUNDS,
+    Own,
     bounds_of,
     camera_at,
     from_coordinate,
@@ -34,6 +35,12 @@ class Sample:
 
     batch: PushBatch
     steps: Int[np.ndarray, "push look"]  # observed steps, the last one repeated
+    own: Own = None  # an engine of the user's own; None: the planar engine
+
+    @property
+    def inputs(self) -> tuple[PushBatch, Int[Array, "push look"], Own]:
+        """The last arguments of `pose_errors`."""
+        return self.batch, jnp.asarray(self.steps), self.own
 
 
 @dataclass(frozen=True)
@@ -44,8 +51,13 @@ class Scale:
     rotation: float  # rad
 
 
-def samples(store: Store) -> list[Sample]:
-    """Return the observed pushes of a store, in batches of equal length."""
+def samples(store: Store, own: Own = None) -> list[Sample]:
+    """Return the observed pushes of a store, in batches of equal length.
+
+    Args:
+        store: of the pushes.
+        own: an engine of the user's own; None: the planar engine.
+    """
     lengths = store.read(slice(None), ("steps",))["steps"]
     found = []
     for length in np.unique(lengths):
@@ -56,7 +68,8 @@ def samples(store: Store) -> list[Sample]:
             seen = np.asarray(batch.pose_observed).any(axis=1)
             if seen.any():
                 batch = jax.tree.map(lambda x, seen=seen: x[seen], batch)
-                found.append(Sample(batch, _looks(np.asarray(batch.pose_observed))))
+                looks = _looks(np.asarray(batch.pose_observed))
+                found.append(Sample(batch, looks, own))
     return found
 
 
@@ -76,9 +89,10 @@ def pose_errors(
     values: Mapping[str, Float[Array, ""]],
     batch: PushBatch,
     steps: Int[Array, "push look"],
+    own: Own = None,
 ) -> Float[Array, "push look body 3"]:
     """Return predicted minus observed poses (m, m, rad); differentiable in values."""
-    scene, engine = with_values(batch.scene, values)
+    scene, engine = with_values(batch.scene, values, own)
     offset = camera_at(values)
     start, controls = (
         batch.initial.with_pusher_moved(offset),
@@ -95,12 +109,12 @@ Values = dict[str, Array]
 
 @eqx.filter_jit
 def _residual(
-    free: Values, fixed: Values, sizes: Array, batch: PushBatch, steps: Array
+    free: Values, fixed: Values, sizes: Array, part: tuple[PushBatch, Array, Own]
 ) -> Array:
-    error = pose_errors(values_at(free | fixed), batch, steps)
+    error = pose_errors(values_at(free | fixed), *part)
     scaled = error / jnp.broadcast_to(sizes, error.shape)
     # Every push has the same weight, whatever the number of compared steps.
-    return scaled.reshape(len(scaled), -1) / jnp.sqrt(1.0 * steps.shape[1])
+    return scaled.reshape(len(scaled), -1) / jnp.sqrt(1.0 * part[1].shape[1])
 
 
 _slope = eqx.filter_jit(jax.jacfwd(_residual))
@@ -124,11 +138,11 @@ def slopes(
 
 def _arguments(
     coordinates: Mapping[str, float], free: Sequence[str], scale: Scale, sample: Sample
-) -> tuple[Values, Values, Array, PushBatch, Array]:
+) -> tuple[Values, Values, Array, tuple[PushBatch, Array, Own]]:
     tree = {name: jnp.float32(value) for name, value in coordinates.items()}
     chosen = {name: tree.pop(name) for name in free}
     sizes = jnp.array([scale.position, scale.position, scale.rotation], jnp.float32)
-    return chosen, tree, sizes, sample.batch, jnp.asarray(sample.steps)
+    return chosen, tree, sizes, sample.inputs
 
 
 _RESAMPLES = 2_000

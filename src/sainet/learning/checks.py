@@ -1,6 +1,6 @@
 """Checks that a training job can run, before its folder is made."""
 
-from sainet.engines.simulator import PlanarSpec, SimulatorSpec
+from sainet.engines.simulator import SIMULATORS, PlanarSpec, SimulatorSpec
 from sainet.learning.recipes import FROM_ENGINE
 from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD
@@ -36,16 +36,17 @@ def check_task(task: Task) -> None:
 
 def _check_simulator(task: Task) -> None:
     info, path, simulator = task.store.info, task.store.path, task.assumed.simulator
-    if not simulator.is_identified and simulator.slug not in info.assumed_engines:
+    is_listed = simulator.slug in SIMULATORS
+    if is_listed and simulator.slug not in info.assumed_engines:
         raise BadStore(
             f"{path}: no simulator prediction of {simulator.slug}; use "
             f"{' or '.join(info.assumed_engines)}, or the folder of identified "
             "parameters."
         )
-    if simulator.is_identified and info.kind != "robot":
+    if not is_listed and info.kind != "robot":
         raise BadStore(
-            f"{path}: kind is {info.kind!r}; an identified engine predicts pushes of "
-            "the robot setup."
+            f"{path}: kind is {info.kind!r}; identified engines and engines of your "
+            "own predict pushes of the robot setup."
         )
 
 

@@ -13,6 +13,7 @@ from jaxtyping import Array
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
+from sainet.engines.simulator import InternalEngine
 from sainet.learning.checks import check_task
 from sainet.learning.log import LogLine, append_log, read_log, rewind_log
 from sainet.learning.loss import LossWeights
@@ -65,7 +66,7 @@ def fit(
     recipe: Recipe,
     out: Path,
     *,
-    assumed_engine: str = "planar",
+    assumed_engine: str | InternalEngine = "planar",
     on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
 ) -> FitResult:
     """Train a network, or resume an interrupted training run.
@@ -77,7 +78,7 @@ def fit(
             start.
         out: the run folder.
         assumed_engine: internal engine of SAIN: its name in the store, or the folder of
-            identified parameters, whose prediction is then computed.
+            identified parameters, whose prediction is then computed; or the engine.
         on_step: called with the number of finished iterations and the last logged loss,
             None before the first.
 

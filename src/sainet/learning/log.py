@@ -1,12 +1,14 @@
 """The log of a training run: JSON lines, equal after an interruption."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 
 from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
+from sainet.runs.progress import Advance
 from sainet.scenes.quantities import Finite
 
 LOG = "log.jsonl"
@@ -65,3 +67,15 @@ def append_log(folder: Path, line: LogLine) -> None:
 
 def _text(line: LogLine) -> str:
     return json.dumps(msgspec.to_builtins(line)) + "\n"
+
+
+def reported(advance: Advance) -> Callable[[int, float | None], None]:
+    """Return the observer of a training run that advances a progress bar."""
+    done = 0
+
+    def on_step(iteration: int, loss: float | None) -> None:
+        nonlocal done
+        advance(iteration - done, loss_note(loss))
+        done = iteration
+
+    return on_step

@@ -275,5 +275,9 @@ def start_named(name: str | None) -> Start:
 
 
 def recipe_for(start: Start) -> Recipe:
-    """Return the recipe that fits a start, with that start."""
+    """Return the recipe that fits a start, with that start.
+
+    Args:
+        start: random weights, a network, or the internal engine.
+    """
     return replace(RECIPES[type(start)], start=start)

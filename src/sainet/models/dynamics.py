@@ -1,21 +1,25 @@
 """Dynamics models behind one `predict`: physics, a corrector, and both together."""
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 import jax
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, UInt64
 
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors import AbstractCorrector, Purpose, Start
 from sainet.models.inputs import push_frame
+from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, unpack_motion
 
 Carry = Any  # what a prediction continues from; each model has a type of its own
 Given = Trajectory | None  # a stored simulator prediction
+Hashes = UInt64[np.ndarray, " push"]
 
 
 class AbstractDynamics(eqx.Module):
@@ -37,6 +41,23 @@ class AbstractDynamics(eqx.Module):
     @property
     def made_for(self) -> Purpose | None:
         """The pushes that its corrector is for; None without a corrector."""
+        return None
+
+    def recall(
+        self, hashes: Callable[[], Hashes], steps: int, bodies: int
+    ) -> np.ndarray | None:
+        """Return predictions of stored pushes that were made elsewhere.
+
+        Args:
+            hashes: returns the hash of each push.
+            steps: of the longest push.
+            bodies: of each push.
+
+        Returns:
+            Poses (m, m, rad) [push, time, body, 3], or final ones [push, body, 3]; None
+            for a model that predicts here.
+        """
+        del hashes, steps, bodies
         return None
 
     @abstractmethod
@@ -152,6 +173,34 @@ def stored_prediction(
     """
     pusher = controls.pusher_motion(initial.pusher_position)
     return Trajectory(unpack_motion(motion, *pusher))
+
+
+SAME_TIME = 1e-9  # s, difference below which time steps are equal
+
+
+def check_purpose(dynamics: AbstractDynamics, kind: str, time_step: float) -> None:
+    """Raise `BadCheckpoint` if a network is for another time step or other controls.
+
+    Its predictions would be wrong without any other sign.
+
+    Args:
+        dynamics: the model.
+        kind: setup of the pushes, `Controls.kind`.
+        time_step: of the scene, s.
+    """
+    made_for = dynamics.made_for
+    if made_for is None:
+        return
+    if made_for.kind != kind:
+        raise BadCheckpoint(
+            f"model: its network is for {made_for.kind} pushes, these are {kind} "
+            f"pushes; train a network on {kind} pushes."
+        )
+    if abs(made_for.time_step - time_step) > SAME_TIME:
+        raise BadCheckpoint(
+            f"model: its network has a time step of {made_for.time_step:g} s, the "
+            f"scene {time_step:g} s; give the scene the same time step."
+        )
 
 
 def predict(

@@ -4,7 +4,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from sainet.engines.simulator import PAPER, TRUE_PROPERTIES, SimulatorSpec
+from sainet.engines.simulator import PAPER, TRUE_PROPERTIES, OwnSpec, SimulatorSpec
 
 Kind = Literal["physics", "in", "sain", "gp", "published"]
 # Pushes that a network was trained on: the paper's simulated pushes; simulated strokes;
@@ -60,6 +60,8 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     def _simulator_part(self) -> str:
         if self.simulator is None or self.kind == "in":
             return ""
+        if isinstance(self.simulator, OwnSpec):
+            return self.simulator.name
         if self.simulator.assumptions == TRUE_PROPERTIES:
             return "true"
         if self.simulator.assumptions != PAPER:

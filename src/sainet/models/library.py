@@ -1,12 +1,10 @@
 """Models by name: physics, a shipped network, or the folder of a trained one."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
-import numpy as np
-from jaxtyping import UInt64
 
 from sainet.engines import RECORDED
 from sainet.engines.simulator import (
@@ -19,7 +17,14 @@ from sainet.engines.simulator import (
     SimulatorSpec,
     simulator_named,
 )
-from sainet.models.card import CARD, IDENTIFIED, Card, is_identified, read_identified
+from sainet.models.card import (
+    CARD,
+    IDENTIFIED,
+    Card,
+    Identified,
+    is_identified,
+    read_identified,
+)
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import (
     AbstractDynamics,
@@ -28,72 +33,10 @@ from sainet.models.dynamics import (
     SimulatorAugmented,
 )
 from sainet.models.identity import ModelId
+from sainet.models.model import Model
 from sainet.models.wrappers import Restarted, with_camera
 from sainet.runs import errors
-from sainet.runs.digests import pushes_overlap
 from sainet.runs.documents import content_hash, read_file
-
-_SAME_TIME = 1e-9  # s
-
-
-@dataclass(frozen=True)
-class Model:
-    """A dynamics model, its identity, and the card of its network if it has one."""
-
-    id: ModelId
-    dynamics: AbstractDynamics
-    card: Card | None = None
-    folder: Path | None = None  # of a trained network or identified parameters
-    digest: str | None = None  # hash of the weights or the identified parameters
-    internal: InternalEngine | None = None  # that predicts s-bar for the dynamics
-
-    @property
-    def name(self) -> str:
-        """The name in tables and JSON."""
-        return self.id.slug
-
-    def check_fits(
-        self,
-        kind: str,
-        time_step: float,
-        *,
-        seed: int | None = None,
-        pushes: UInt64[np.ndarray, " push"] | None = None,
-    ) -> None:
-        """Raise `BadCheckpoint` if the network is not for these pushes.
-
-        Args:
-            kind: setup of the pushes.
-            time_step: of the pushes (s).
-            seed: of simulated test pushes; None otherwise.
-            pushes: hashes of the test pushes (`Store.push_hashes`); None: unknown.
-        """
-        if self.card is None:
-            return
-        path = f"{self.folder}/{CARD}"
-        if self.card.kind != kind:
-            raise errors.BadCheckpoint(
-                f"{path}: kind is {self.card.kind!r}, the data's is "
-                f"{kind!r}; train a network on such pushes, or give `force`."
-            )
-        if abs(self.card.time_step - time_step) > _SAME_TIME:
-            raise errors.BadCheckpoint(
-                f"{path}: time_step is {self.card.time_step} s, the data's is "
-                f"{time_step} s; train a network on such data, or give `force`."
-            )
-        if seed is not None and seed in self.card.data_seeds:
-            raise errors.BadCheckpoint(
-                f"{path}: data_seeds has {seed}, the seed of the data: the network may "
-                "have been trained on these very pushes. Generate others with another "
-                "`seed`, or give `force`."
-            )
-        seen = 0 if pushes is None else pushes_overlap(self.card.pushes, pushes)
-        if pushes is not None and seen:
-            raise errors.BadCheckpoint(
-                f"{path}: the network was trained on {seen} of these {len(pushes)} "
-                "pushes. Test it on others ('sainet split'), or give `force`."
-            )
-
 
 # What the engine of each physics model assumes; it may be any engine of `SIMULATORS`.
 PHYSICS: Mapping[str, Assumptions] = {"physics": PAPER, "physics-true": TRUE_PROPERTIES}
@@ -222,14 +165,23 @@ def _identified_physics(
             f"{folder / IDENTIFIED}: its parameters are those of the planar engine, "
             f"not of {engine}; leave `engine` out."
         )
-    internal = read_identified(folder).engine
-    identity = ModelId(kind="physics", simulator=internal.simulator)
-    simulator = _ordered(internal.simulator, order)
-    internal = msgspec.structs.replace(internal, simulator=simulator)
-    physics = PhysicsDynamics(internal.simulator.build())
+    found = identified_physics(read_identified(folder), order)
     digest = content_hash(read_file(folder / IDENTIFIED))
-    dynamics = with_camera(physics, internal.camera)
-    return Model(named(identity, folder), dynamics, None, folder, digest, internal)
+    return replace(found, id=named(found.id, folder), folder=folder, digest=digest)
+
+
+def identified_physics(found: Identified, order: Sequence[int] | None = None) -> Model:
+    """Return the planar engine with estimated parameters.
+
+    Args:
+        found: the estimates.
+        order: see `load_model`.
+    """
+    identity = ModelId(kind="physics", simulator=found.engine.simulator)
+    simulator = _ordered(found.engine.simulator, order)
+    internal = msgspec.structs.replace(found.engine, simulator=simulator)
+    dynamics = with_camera(PhysicsDynamics(simulator.build()), internal.camera)
+    return Model(identity, dynamics, internal=internal, identified=found)
 
 
 def network_folder(name: str) -> Path:
@@ -271,13 +223,15 @@ def _restarted(folder: Path, dynamics: AbstractDynamics) -> AbstractDynamics:
     return Restarted(dynamics)
 
 
-def find_internal_engine(name: str) -> InternalEngine:
-    """Return an internal engine by the name of its simulator or its folder.
+def find_internal_engine(name: str | InternalEngine) -> InternalEngine:
+    """Return an internal engine, found by the name of its simulator or its folder.
 
     Raises:
         UnknownName: neither a simulator nor a folder has this name.
         BadInput: the folder contains no identified parameters.
     """
+    if isinstance(name, InternalEngine):
+        return name
     folder = Path(name)
     if name in SIMULATORS or not folder.is_dir():
         return InternalEngine(simulator_named(name))

@@ -11,9 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.models.dynamics import AbstractDynamics
-from sainet.planning.checks import check_model, check_observation, doubts
+from sainet.models.dynamics import AbstractDynamics, check_purpose
+from sainet.planning.checks import check_observation, doubts
 from sainet.planning.levels import Found, Problem, batch_of, roll_pushes
+from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
@@ -64,7 +65,7 @@ class AbstractPlanner(eqx.Module):
             BadCheckpoint: the model is for another time step or other controls.
             Diverged: no candidate push has a finite prediction.
         """
-        check_model(dynamics, scene)
+        check_purpose(dynamics, PathControls.kind, scene.time_step)
         gap = check_observation(scene, state)
         problem = Problem(dynamics, task, scene, state, self.actions)
         found = self.search(problem)

@@ -7,8 +7,7 @@ import numpy as np
 
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics
-from sainet.runs.errors import BadCheckpoint, BadScene
-from sainet.scenes.controls import PathControls
+from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pair_gaps
@@ -16,32 +15,11 @@ from sainet.scenes.state import State, check_state
 
 _DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise
 _APART = 5e-3  # m, gap that counts as apart: networks are trained on touching disks
-_SAME_TIME = 1e-9  # s, difference below which time steps are equal
 # With fewer training pushes the errors of networks rise steeply: they double from 150
 # to 50 simulated pushes (`sainet reproduce data-efficiency`).
 _FEW_PUSHES = 150
 _SLACK = 1e-3  # relative tolerance of the training range
 _compiled_gaps = eqx.filter_jit(pair_gaps)
-
-
-def check_model(dynamics: AbstractDynamics, scene: Scene) -> None:
-    """Raise `BadCheckpoint` if a network is for another time step or other controls.
-
-    Its predictions would be wrong without any other sign.
-    """
-    made_for = dynamics.made_for
-    if made_for is None:
-        return
-    if made_for.kind != PathControls.kind:
-        raise BadCheckpoint(
-            f"model: its network is for {made_for.kind} pushes, but planners push "
-            f"along paths; train a network on {PathControls.kind} pushes."
-        )
-    if abs(made_for.time_step - scene.time_step) > _SAME_TIME:
-        raise BadCheckpoint(
-            f"model: its network has a time step of {made_for.time_step:g} s, the "
-            f"scene {scene.time_step:g} s; give the scene the same time step."
-        )
 
 
 def check_observation(scene: Scene, state: State) -> float:

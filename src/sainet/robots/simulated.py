@@ -15,10 +15,9 @@ from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
-from sainet.scenes.state import State, at_rest
+from sainet.scenes.state import State, at_rest, in_a_row
 from sainet.worlds.config import WorldConfig, bounds
 from sainet.worlds.noise import NoiseConfig, at_level
-from sainet.worlds.sampling import in_a_row
 from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
 

@@ -3,6 +3,8 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax import dtypes
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from sainet.scenes.controls import ForceControls, PathControls
@@ -23,6 +25,29 @@ class Push(eqx.Module):
     length: Float[Array, "*batch"]  # m
     speed: Float[Array, "*batch"]  # m/s
 
+    def __init__(
+        self,
+        contact_angle: ArrayLike,
+        direction: ArrayLike = 0.0,
+        length: ArrayLike = 0.010,
+        speed: ArrayLike = 0.050,
+    ) -> None:
+        """Return a push, or a batch of pushes.
+
+        Args:
+            contact_angle: rad. Numbers and arrays are broadcast against each other;
+                numbers are single precision.
+            direction: rad.
+            length: m.
+            speed: m/s.
+        """
+        given = contact_angle, direction, length, speed
+        kinds = [np.dtype(getattr(each, "dtype", np.float32)) for each in given]
+        floats = [kind for kind in kinds if kind.kind == "f"] or [np.float32]
+        kind = dtypes.canonicalize_dtype(np.result_type(*floats))
+        arrays = jnp.broadcast_arrays(*(jnp.asarray(each, kind) for each in given))
+        self.contact_angle, self.direction, self.length, self.speed = arrays
+
 
 class PushGrid(eqx.Module):
     """The paper's 12 by 6 pushes: midpoints of the bins of both angles."""
@@ -39,13 +64,7 @@ class PushGrid(eqx.Module):
         contact = _midpoints(self.contact_bins, self.contact_range)
         angle = _midpoints(self.direction_bins, self.direction_range)
         contact, angle = jnp.meshgrid(contact, angle, indexing="ij")
-        same = jnp.ones(contact.size)
-        return Push(
-            contact_angle=contact.ravel(),
-            direction=angle.ravel(),
-            length=self.length * same,
-            speed=self.speed * same,
-        )
+        return Push(contact.ravel(), angle.ravel(), self.length, self.speed)
 
 
 def _midpoints(bins: int, reach: float) -> Float[Array, " bin"]:

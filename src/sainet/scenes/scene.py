@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
 from sainet.scenes.quantities import PROPERTIES, TIME_STEP_RANGE
+from sainet.scenes.state import State, in_a_row
 
 GRAVITY = 9.81  # m/s^2
 TIME_STEP = 1 / 240  # s, the paper's
@@ -96,6 +97,13 @@ class Scene(eqx.Module):
         )
         check_scene(scene)
         return scene
+
+    def in_a_row(self) -> State:
+        """Return the disks at rest, touching along the x axis, disk 1 at the origin.
+
+        The pusher is behind disk 1 without touching it.
+        """
+        return in_a_row(self.radius)
 
     @property
     def body_count(self) -> int:

@@ -79,7 +79,13 @@ def at_rest(
     angle: Float[Array, "*batch body"],
     pusher_position: Float[Array, "*batch 2"],
 ) -> State:
-    """Return the state at rest with the given poses."""
+    """Return the state at rest with the given poses.
+
+    Args:
+        position: of the disks, m.
+        angle: of the disks, rad.
+        pusher_position: m.
+    """
     return State(
         position=position,
         angle=angle,
@@ -87,6 +93,23 @@ def at_rest(
         spin=jnp.zeros_like(angle),
         pusher_position=pusher_position,
         pusher_velocity=jnp.zeros_like(pusher_position),
+    )
+
+
+def in_a_row(radius: Float[Array | np.ndarray, "*batch body"]) -> State:
+    """Return disks at rest that touch, along the x axis, disk 1 at the origin.
+
+    Args:
+        radius: of each disk, m. NumPy's are added in their own precision.
+    """
+    xp = np if isinstance(radius, np.ndarray) else jnp
+    reach = xp.cumsum(radius[..., :-1] + radius[..., 1:], axis=-1)
+    x = xp.concatenate([xp.zeros_like(radius[..., :1]), reach], axis=-1)
+    behind = xp.stack([-2 * radius[..., 0], 0 * radius[..., 0]], axis=-1)
+    return at_rest(
+        jnp.asarray(xp.stack([x, 0 * x], axis=-1), jnp.float32),
+        jnp.zeros(radius.shape, jnp.float32),
+        jnp.asarray(behind, jnp.float32),
     )
 
 

@@ -19,7 +19,7 @@ from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import PAPER
 from sainet.models.dynamics import predict
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.report.episode_frames import Replay, Track, outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report

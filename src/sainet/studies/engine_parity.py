@@ -17,7 +17,7 @@ from sainet.engines.planar.engine import PlanarEngine
 from sainet.evaluation.measurements import Condition
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene

@@ -21,7 +21,7 @@ from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.learning.recipes import FINE_TUNING, FromModel
 from sainet.models.identity import ModelId
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.robots import Surface
 from sainet.runs.errors import MissingExtra
 from sainet.studies import Scale

@@ -14,7 +14,8 @@ from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
 from sainet.models.identity import Features, ModelId, ModelKind
 from sainet.models.identity import Variant as Made
-from sainet.models.library import Model, load_model, network_folder
+from sainet.models.library import load_model, network_folder
+from sainet.models.model import Model
 from sainet.models.wrappers import with_camera
 from sainet.studies import Scale
 from sainet.studies.paper_setup import physics, scaled

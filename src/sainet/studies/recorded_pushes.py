@@ -20,7 +20,7 @@ from sainet.evaluation.evaluate import EndOffsets, end_offsets
 from sainet.evaluation.joining import add_models, join_folds, without_predictions
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.models.identity import Features, ModelKind
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.studies.recorded_models import (
     Inside,
     Learned,

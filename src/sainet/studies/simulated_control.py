@@ -16,7 +16,7 @@ from sainet.control.trials import measure_trials, run_trials
 from sainet.evaluation.claims import Claim, solves_more
 from sainet.evaluation.measurements import Condition, Measurements, PublishedValues
 from sainet.models.identity import ModelId
-from sainet.models.library import Model
+from sainet.models.model import Model
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.steps import Join, Load, Step, Train
 from sainet.studies.study import Plan, Scope, Study

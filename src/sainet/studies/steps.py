@@ -24,7 +24,8 @@ from sainet.learning.log import loss_note
 from sainet.learning.recipes import FromModel, Recipe
 from sainet.models.card import CARD
 from sainet.models.identity import ModelId
-from sainet.models.library import Model, load_model
+from sainet.models.library import load_model
+from sainet.models.model import Model
 from sainet.runs.documents import content_hash
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from sainet.runs.errors import BadInput
 from sainet.scenes.pushes import Push, place_pusher
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
-from sainet.scenes.state import State, at_rest
+from sainet.scenes.state import State, at_rest, in_a_row
 from sainet.worlds.config import Range, WorldConfig, bounds
 
 _ARRANGEMENTS = 200  # of all disks of a scene
@@ -185,15 +185,6 @@ def _is_free(
     others = [i for i in range(len(placed)) if i != skip]
     return all(
         np.hypot(*(place - placed[i])) >= radius + radii[i] + 1e-6 for i in others
-    )
-
-
-def in_a_row(radius: Float[np.ndarray, " body"]) -> State:
-    """Return disks at rest that touch, along the x axis, disk 1 at the origin."""
-    x = np.concatenate([[0.0], np.cumsum(radius[:-1] + radius[1:])])
-    behind = jnp.array([-2 * radius[0], 0], jnp.float32)
-    return at_rest(
-        _single(np.stack([x, 0 * x], axis=-1)), jnp.zeros(len(radius)), behind
     )
 
 

@@ -23,8 +23,7 @@ from sainet.robots.lab.hidden import (
 from sainet.robots.lab.mechanics import TICK, Mechanics
 from sainet.robots.lab.robot import LabRobot
 from sainet.scenes.pushes import Push, command_path
-from sainet.scenes.state import State, at_rest
-from sainet.worlds.sampling import in_a_row
+from sainet.scenes.state import State, at_rest, in_a_row
 
 FLAT = Field(np.zeros((1, 2)), np.zeros(1), 0.0)
 # As close as planar engine and Bullet are to each other in the studies.

@@ -15,8 +15,7 @@ from sainet.scenes.pushes import Push, place_pusher, push_direction
 from sainet.scenes.recording import Conditions, Recording
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
-from sainet.scenes.state import State, at_rest
-from sainet.worlds.sampling import in_a_row
+from sainet.scenes.state import State, at_rest, in_a_row
 
 CLEARANCE = 0.003  # m, between the pusher and disk 1 when it has descended
 _APPROACH = 0.03  # m/s

@@ -1,0 +1,173 @@
+"""Engines of a user's own: a step function becomes a simulator."""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array
+
+from sainet.engines.base import AbstractEngine
+from sainet.engines.simulator import OWN, InternalEngine, OwnSpec
+from sainet.models.dynamics import PhysicsDynamics
+from sainet.models.identity import ModelId
+from sainet.models.model import Model
+from sainet.runs.documents import checked
+from sainet.runs.errors import BadInput
+from sainet.scenes.controls import Controls
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
+
+Step = Callable[[Scene, State], State]
+_DISKS = ("position", "angle", "velocity", "spin")
+
+
+class AbstractStepEngine(AbstractEngine):
+    """An engine that repeats a step function; the pusher follows its path."""
+
+    step: eqx.AbstractVar[Step]
+    name: eqx.AbstractVar[str]
+
+    @abstractmethod
+    def states(self, scene: Scene, initial: State, controls: Controls) -> State:
+        """Return the states after each step, [push, time, ...]."""
+
+    def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
+        """Return the states after each step of the controls.
+
+        Raises:
+            BadInput: a force drives the pusher, or the step function returns arrays of
+                another shape.
+        """
+        if controls.pusher_path is None:
+            raise BadInput(
+                f"engine '{self.name}': a force drives the pusher; engines of your own "
+                "take pushers that follow a path."
+            )
+        shape = scene.batch_shape
+        axes = len(shape)
+
+        def flat(x: Array) -> Array:
+            return x.reshape(-1, *x.shape[axes:])
+
+        found = self.states(*jax.tree.map(flat, (scene, initial, controls)))
+        return Trajectory(
+            jax.tree.map(lambda x: x.reshape(*shape, *x.shape[1:]), found)
+        )
+
+    def after(self, scene: Scene, state: State, path: Any) -> State:  # noqa: ANN401
+        """Return the state one step later.
+
+        Args:
+            scene: of each push.
+            state: of each push, before the step.
+            path: position of the pusher at the end of the step, [push, 2] (m).
+        """
+        velocity = (path - state.pusher_position) / scene.time_step
+        driven = eqx.tree_at(lambda s: s.pusher_velocity, state, velocity)
+        found = self.step(scene, driven)
+        if not isinstance(found, State):  # pyright: ignore[reportUnnecessaryIsInstance]
+            kind = type(found).__name__
+            raise BadInput(
+                f"engine '{self.name}': its step returns a {kind}; it must be a State."
+            )
+        moved: list[Any] = []
+        for name in _DISKS:
+            value, before = getattr(found, name), getattr(state, name)
+            if np.shape(value) != before.shape:
+                raise BadInput(
+                    f"engine '{self.name}': its step returns {name} of the shape "
+                    f"{list(np.shape(value))}; it must be {list(before.shape)}."
+                )
+            moved.append(value.astype(before.dtype))
+        return eqx.tree_at(_fields, driven, [*moved, path])
+
+
+def _fields(state: State) -> list[Any]:
+    return [*(getattr(state, name) for name in _DISKS), state.pusher_position]
+
+
+class StepEngine(AbstractStepEngine):
+    """A step function in JAX: compiled, and differentiable as far as it is."""
+
+    step: Step
+    name: str = eqx.field(static=True)
+
+    def states(self, scene: Scene, initial: State, controls: Controls) -> State:
+        """Return the states after each step, [push, time, ...]."""
+
+        def advance(state: State, path: Array) -> tuple[State, State]:
+            after = self.after(scene, state, path)
+            return after, after
+
+        path = jnp.moveaxis(controls.command, 1, 0)
+        states = lax.scan(advance, initial, path)[1]
+        return jax.tree.map(lambda x: jnp.moveaxis(x, 0, 1), states)
+
+
+class HostStepEngine(AbstractStepEngine):
+    """A step function on NumPy arrays: not compiled, and without derivatives."""
+
+    step: Step
+    name: str = eqx.field(static=True)
+
+    @property
+    def on_host(self) -> bool:
+        """True: it runs outside JAX."""
+        return True
+
+    def states(self, scene: Scene, initial: State, controls: Controls) -> State:
+        """Return the states after each step, [push, time, ...]."""
+        scene, state, path = jax.tree.map(
+            np.asarray, (scene, initial, controls.command)
+        )
+        found: list[State] = []
+        for time in range(path.shape[1]):
+            state = self.after(scene, state, path[:, time])
+            found.append(state)
+        return jax.tree.map(lambda *x: jnp.stack([*map(jnp.asarray, x)], 1), *found)
+
+
+def from_step(step: Step, *, name: str, numpy: bool = False, version: int = 1) -> Model:
+    """Return a model that simulates with an engine of your own.
+
+    The model predicts and plans as every other; `tune(engine=...)` trains a network
+    around it, and `identify(engine=...)` estimates the frictions of its scenes.
+
+    Example: disk 1 is carried by the pusher, friction stops nothing::
+
+        def step(scene, state):
+            carried = (jnp.arange(state.body_count) == 0)[:, None]
+            velocity = jnp.where(carried, state.pusher_velocity[:, None], 0.0)
+            position = state.position + scene.time_step * velocity
+            return replace(state, position=position, velocity=velocity)
+
+        carrying = sn.from_step(step, name="carrying")
+
+    Args:
+        step: `step(scene, state)` returns the state one step later. All arrays have a
+            leading axis, push: `scene.mass` [push, body] (kg), `state.position`
+            [push, body, 2] (m), `state.angle` [push, body] (rad), `state.velocity`
+            [push, body, 2] (m/s), `state.spin` [push, body] (rad/s). The pusher starts
+            at `state.pusher_position` [push, 2] (m) and moves with
+            `state.pusher_velocity` (m/s) during the step; where it is afterwards is
+            filled in. `scene.time_step` is the step in seconds. `dataclasses.replace`
+            of the state, or `jax.vmap` of a function for one push, is the short way.
+            Velocities fit the poses: p(t+1) = p(t) + dt * v(t+1).
+        name: of the engine: letters, digits, "_", "." and "-". A network that was
+            trained around it is loaded where an engine of this name was made before.
+        numpy: the function takes NumPy arrays; then it is neither compiled nor
+            differentiated, and `jax.vmap` does not apply to the model.
+        version: of the equations; a folder of an older version is not continued.
+
+    Raises:
+        BadInput: the name has other characters.
+    """
+    spec = checked(OwnSpec(name=name, version=version), "engine")
+    OWN[name] = (HostStepEngine if numpy else StepEngine)(step, name)
+    identity = ModelId(kind="physics", simulator=spec, name=name)
+    return Model(identity, PhysicsDynamics(spec.build()), internal=InternalEngine(spec))

@@ -1,0 +1,141 @@
+"""Identification and training in scripts."""
+
+from contextlib import AbstractContextManager, nullcontext
+from os import PathLike, fspath
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from sainet.api.models import Loadable, load
+from sainet.api.progress import shown_progress
+from sainet.api.pushes import Dataset, store_of
+from sainet.engines.simulator import SIMULATORS, InternalEngine
+from sainet.identification.identify import identify as estimate
+from sainet.identification.identify import identify_into
+from sainet.learning.fit import fit
+from sainet.learning.log import reported
+from sainet.learning.recipes import FROM_ENGINE, Recipe, recipe_for, start_named
+from sainet.models.identity import ModelKind
+from sainet.models.library import find_internal_engine, identified_physics
+from sainet.models.model import Model
+from sainet.runs.errors import BadInput
+
+Folder = PathLike[str] | str
+
+
+def identify(
+    pushes: Dataset,
+    *,
+    engine: Loadable = "planar",
+    out: Folder | None = None,
+    progress: bool | None = None,
+) -> Model:
+    """Estimate frictions, pressure distribution and camera offset from pushes.
+
+    Args:
+        pushes: along paths, observed at least at their ends.
+        engine: the planar engine, or one of your own in JAX (`from_step`): of that,
+            frictions and camera offset are estimated, as far as its step depends on
+            the frictions of the scene. Engines outside JAX have no derivatives.
+        out: run folder to write, which commands take as a model; None: no files.
+        progress: show a progress bar; None: on a terminal.
+
+    Returns:
+        The engine with the estimated parameters, as a model. `identified` has
+        the estimates with 95 % intervals, and which are not identifiable: these keep
+        their initial values.
+
+    Raises:
+        BadStore: no pose was observed, or forces drive the pusher.
+        BadInput: the engine has no derivatives.
+        RunConflict: the folder belongs to another run.
+    """
+    store, simulator = store_of(pushes), _internal(engine).simulator
+    title = f"Fitting to {store.info.pushes} pushes"
+    with shown_progress(title, None, progress) as advance:
+
+        def on_try(error: float) -> None:
+            advance(1, f"error {error:.3f}")
+
+        if out is not None:
+            identify_into(store, Path(out), simulator=simulator, on_try=on_try)
+            return load(out)
+        return identified_physics(estimate(store, simulator, on_try=on_try))
+
+
+def tune(
+    model: ModelKind,
+    pushes: Dataset,
+    *,
+    engine: Loadable = "planar",
+    start: Folder | Model = FROM_ENGINE,
+    recipe: Recipe | None = None,
+    iterations: int | None = None,
+    seed: int | None = None,
+    out: Folder | None = None,
+    progress: bool | None = None,
+) -> Model:
+    """Train a network on few pushes, around an engine or from an existing network.
+
+    Args:
+        model: `sain`, a network around an engine, or `in`, a network without one.
+        pushes: to train on.
+        engine: internal engine of SAIN: identified physics, a simulator whose
+            prediction the dataset contains, or a folder of identified parameters.
+        start: `engine` starts as the internal engine, with a network that adds nothing
+            to its motion at first; otherwise a network to train further: shipped, its
+            folder, or a model with a folder.
+        recipe: settings of training; None: those that fit the start.
+        iterations: gradient steps; None: those of the recipe.
+        seed: of everything random; None: that of the recipe.
+        out: run folder, with the network and the log of its training; an identical
+            call resumes. None: a temporary folder, deleted at the end.
+        progress: show a progress bar; None: on a terminal.
+
+    Raises:
+        BadStore: the data lack inputs of the network.
+        BadCheckpoint: training cannot start from that network.
+        RunConflict: the folder belongs to another run.
+        Diverged: the loss became NaN or infinite.
+    """
+    given = {"iterations": iterations, "seed": seed}
+    begun = recipe_for(start_named(_start_name(start))) if recipe is None else recipe
+    settings = begun.changed(**{k: v for k, v in given.items() if v is not None})
+    total = settings.optimiser.iterations
+    with _folder(out) as folder:
+        with shown_progress(f"Training {model.upper()}", total, progress) as advance:
+            fit(
+                model,
+                store_of(pushes),
+                settings,
+                Path(folder),
+                assumed_engine=_internal(engine),
+                on_step=reported(advance),
+            )
+        found = load(folder)
+    return found if out is not None else found.without_folder()
+
+
+def _start_name(start: Folder | Model) -> str:
+    if not isinstance(start, Model):
+        return fspath(start)
+    if start.folder is None:
+        raise BadInput(
+            f"`start` is {start.name}, which has no folder; train it with `out`."
+        )
+    return str(start.folder)
+
+
+def _internal(engine: Loadable) -> InternalEngine:
+    if isinstance(engine, str) and engine in SIMULATORS:
+        return find_internal_engine(engine)
+    found = load(engine)
+    if found.internal is None or found.card is not None:
+        raise BadInput(
+            f"`engine` is {found.name}; it must be physics: identified, an engine of "
+            f"your own, or one of {', '.join(SIMULATORS)}."
+        )
+    return found.internal
+
+
+def _folder(out: Folder | None) -> AbstractContextManager[str]:
+    return TemporaryDirectory() if out is None else nullcontext(fspath(out))

@@ -1,0 +1,210 @@
+"""Models: a dynamics model with its identity, and the card of its network."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import msgspec
+import numpy as np
+from jax.core import Tracer
+from jaxtyping import UInt64
+
+from sainet.engines.simulator import InternalEngine
+from sainet.models.card import CARD, Card, Identified
+from sainet.models.dynamics import (
+    SAME_TIME,
+    AbstractDynamics,
+    check_purpose,
+    predict,
+)
+from sainet.models.identity import ModelId
+from sainet.runs.digests import pushes_overlap
+from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
+from sainet.scenes.controls import Controls, PathControls
+from sainet.scenes.pushes import Push, command_path
+from sainet.scenes.quantities import CONTACT_ANGLE, DIRECTION, SPEED, STROKE
+from sainet.scenes.scene import TIME_STEP, Scene
+from sainet.scenes.state import State, Trajectory
+from sainet.worlds.setups import RobotSetup
+
+_USUAL_STEPS = 200  # of a push whose length or speed is traced
+_PARAMETERS = {
+    "contact_angle": CONTACT_ANGLE,
+    "direction": DIRECTION,
+    "length": STROKE,
+    "speed": SPEED,
+}
+
+
+@dataclass(frozen=True)
+class Model:
+    """A dynamics model, its identity, and the card of its network if it has one."""
+
+    id: ModelId
+    dynamics: AbstractDynamics
+    card: Card | None = None
+    folder: Path | None = None  # of a trained network or identified parameters
+    digest: str | None = None  # hash of the weights or the identified parameters
+    internal: InternalEngine | None = None  # that predicts s-bar for the dynamics
+    identified: Identified | None = None  # estimates of identified physics
+
+    def __repr__(self) -> str:
+        """Return name and kind in one line."""
+        label = "" if self.name == self.id.label else f": {self.id.label}"
+        return f"<Model {self.name}{label}>"
+
+    @property
+    def name(self) -> str:
+        """The name in tables and JSON."""
+        return self.id.slug
+
+    def called(self, name: str) -> "Model":
+        """Return the model under another name in tables and JSON."""
+        if self.name == name:
+            return self
+        return replace(self, id=msgspec.structs.replace(self.id, name=name))
+
+    def without_folder(self) -> "Model":
+        """Return the model in memory; its folder and the folder's name are gone."""
+        identity = self.card.identity if self.card else self.id
+        return replace(self, id=identity, folder=None)
+
+    def predict(
+        self,
+        scene: Scene,
+        state: State,
+        push: Push | Controls,
+        *,
+        steps: int | None = None,
+    ) -> Trajectory:
+        """Return the motion of disks that a push moves.
+
+        Scene, state and push may each have one leading axis, push; a part without it
+        is used for all. `jax.vmap`, `jax.jit` and `jax.grad` apply where the model is
+        JAX throughout (`dynamics.on_host` is False).
+
+        Args:
+            scene: properties given to the model.
+            state: poses of the disks at rest, position [body, 2] (m), angle [body]
+                (rad). With controls: the complete state at their start.
+            push: parameters of a straight push; the pusher starts where it touches
+                disk 1. Or the controls of one.
+            steps: number of steps of 1/240 s of a `Push`; None: until it has ended and
+                the disks rest, 200 for a push of 10 mm at 50 mm/s. Of a push whose
+                length or speed is traced, None is 200.
+
+        Returns:
+            States after each step: `trajectory.states.position` is [time, body, 2] (m),
+            `trajectory.final` the last state; batches have a leading axis.
+
+        Raises:
+            BadScene: a push is out of range, or the parts do not fit each other.
+            BadCheckpoint: the network is for other pushes or another time step.
+            BadInput: the model is not JAX, and the push is traced.
+        """
+        if scene.body_count != state.body_count:
+            raise BadScene(
+                f"state: it has {state.body_count} disks, the scene {scene.body_count}."
+            )
+        if self.dynamics.on_host and _is_traced((scene, state, push)):
+            raise BadInput(
+                f"{self.name} does not run in JAX, which cannot trace it; give a batch "
+                "of pushes."
+            )
+        if isinstance(push, Push):
+            steps = _steps_of(push, scene.time_step) if steps is None else steps
+            scene, state, push = _together(scene, state, push)
+            state, push = _command(scene, state, push, steps)
+        check_purpose(self.dynamics, push.kind, scene.time_step)
+        return predict(self.dynamics, scene, state, push)
+
+    def check_fits(
+        self,
+        kind: str,
+        time_step: float,
+        *,
+        seed: int | None = None,
+        pushes: UInt64[np.ndarray, " push"] | None = None,
+    ) -> None:
+        """Raise `BadCheckpoint` if the network is not for these pushes.
+
+        Args:
+            kind: setup of the pushes.
+            time_step: of the pushes (s).
+            seed: of simulated test pushes; None otherwise.
+            pushes: hashes of the test pushes (`Store.push_hashes`); None: unknown.
+        """
+        if self.card is None:
+            return
+        path = f"{self.folder}/{CARD}" if self.folder else self.name
+        if self.card.kind != kind:
+            raise BadCheckpoint(
+                f"{path}: kind is {self.card.kind!r}, the data's is "
+                f"{kind!r}; train a network on such pushes, or give `force`."
+            )
+        if abs(self.card.time_step - time_step) > SAME_TIME:
+            raise BadCheckpoint(
+                f"{path}: time_step is {self.card.time_step} s, the data's is "
+                f"{time_step} s; train a network on such data, or give `force`."
+            )
+        if seed is not None and seed in self.card.data_seeds:
+            raise BadCheckpoint(
+                f"{path}: data_seeds has {seed}, the seed of the data: the network may "
+                "have been trained on these very pushes. Generate others with another "
+                "`seed`, or give `force`."
+            )
+        seen = 0 if pushes is None else pushes_overlap(self.card.pushes, pushes)
+        if pushes is not None and seen:
+            raise BadCheckpoint(
+                f"{path}: the network was trained on {seen} of these {len(pushes)} "
+                "pushes. Test it on others ('sainet split'), or give `force`."
+            )
+
+
+def _is_traced(tree: object) -> bool:
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
+
+
+def _steps_of(push: Push, time_step: float) -> int:
+    """Return the steps until every push has ended and the disks rest."""
+    for name, quantity in _PARAMETERS.items():
+        value = getattr(push, name)
+        if not _is_traced(value):
+            quantity.check(value, f"push: {name}", error=BadScene)
+    if _is_traced((push.length, push.speed)):
+        return _USUAL_STEPS
+    # Single-precision numbers as they were meant: 0.05, not 0.0500000007.
+    given = np.array([push.length, push.speed], np.float64)
+    length, speed = np.round(given.reshape(2, -1), 7)
+    steps = RobotSetup().steps(length, speed).max()
+    return int(np.ceil(steps * TIME_STEP / time_step - 1e-6))
+
+
+def _together(scene: Scene, state: State, push: Push) -> tuple[Scene, State, Push]:
+    """Return the parts with equal leading axes."""
+    parts = (scene, state, push)
+    own = scene.batch_shape, state.angle.shape[:-1], push.speed.shape
+    try:
+        shape = np.broadcast_shapes(*own)
+    except ValueError:
+        names = ", ".join(map(str, own))
+        raise BadScene(
+            f"push: the leading axes of scene, state and push are {names}; give equal "
+            "ones, or none."
+        ) from None
+
+    def widened(part: Any, axes: int) -> Any:  # noqa: ANN401
+        return jax.tree.map(lambda x: jnp.broadcast_to(x, shape + x.shape[axes:]), part)
+
+    found = (widened(*pair) for pair in zip(parts, map(len, own), strict=True))
+    return tuple(found)
+
+
+@eqx.filter_jit
+def _command(
+    scene: Scene, state: State, push: Push, steps: int
+) -> tuple[State, PathControls]:
+    return command_path(scene, state, push, steps=steps)

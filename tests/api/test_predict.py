@@ -1,0 +1,155 @@
+"""Models predict pushes that are given as plain numbers, single or in batches."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import sainet as sn
+from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
+from sainet.scenes.pushes import command_path
+from sainet.scenes.shapes import pair_gaps
+
+SCENE = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
+ANGLES = jnp.array([-0.3, 0.0, 0.4])
+
+
+@pytest.fixture(scope="module", params=["physics", "in", "sain"])
+def model(request) -> sn.Model:
+    return sn.load(request.param)
+
+
+def test_numbers_become_single_precision_scalars():
+    push = sn.Push(0.2, speed=np.float64(0.1))
+    for value, wanted in zip(jax.tree.leaves(push), (0.2, 0.0, 0.01, 0.1), strict=True):
+        assert value.shape == ()
+        assert value.dtype == jnp.float32
+        assert value == np.float32(wanted)
+
+
+def test_numbers_are_broadcast_against_arrays():
+    push = sn.Push(contact_angle=ANGLES)
+    assert {x.shape for x in jax.tree.leaves(push)} == {(3,)}
+    assert sn.Push(1, 0, np.arange(2), 1).length.dtype == jnp.float32
+
+
+@pytest.mark.parametrize("radius", [[0.05], [0.054, 0.059], [0.05, 0.06, 0.04]])
+def test_disks_in_a_row_touch_their_neighbours(radius):
+    scene = sn.Scene.disks([1.0] * len(radius), radius)
+    gaps = np.asarray(pair_gaps(scene, scene.in_a_row()))
+    np.testing.assert_allclose(np.diagonal(gaps, 1), 0, atol=1e-7)
+    assert (gaps > -1e-7).all()
+
+
+def test_scenes_of_a_batch_have_the_rows_of_their_own():
+    radius = jnp.array([[0.05, 0.06], [0.04, 0.05]])
+    alone = [sn.Scene.disks([1, 1], row.tolist()) for row in radius]
+    scenes = jax.tree.map(lambda *x: jnp.stack(x), *alone)
+    for found in (scenes.in_a_row(), jax.vmap(lambda s: s.in_a_row())(scenes)):
+        for index, each in enumerate(alone):
+            wanted = each.in_a_row()
+            np.testing.assert_array_equal(found.position[index], wanted.position)
+            np.testing.assert_array_equal(
+                found.pusher_position[index], wanted.pusher_position
+            )
+
+
+def test_vmap_over_pushes_equals_a_loop_and_a_batch(model):
+    state = SCENE.in_a_row()
+
+    def final(angle):
+        push = sn.Push(contact_angle=angle)
+        return model.predict(SCENE, state, push, steps=60).final.position
+
+    mapped = jax.vmap(final)(ANGLES)
+    assert mapped.shape == (3, 2, 2)
+    pushes = sn.Push(contact_angle=ANGLES)
+    batch = model.predict(SCENE, state, pushes, steps=60).final.position
+    for index, angle in enumerate(ANGLES):
+        alone = final(float(angle))
+        np.testing.assert_allclose(mapped[index], alone, atol=2e-6)
+        np.testing.assert_allclose(batch[index], alone, atol=2e-6)
+    # Turned contacts move the disks to other places.
+    assert np.ptp(np.asarray(batch)[:, 0, 1]) > 1e-3
+
+
+def test_vmap_over_whole_pushes_takes_200_steps():
+    physics, pushes = sn.load("physics"), sn.Push(contact_angle=ANGLES)
+    found = jax.vmap(lambda p: physics.predict(SCENE, SCENE.in_a_row(), p))(pushes)
+    assert found.states.angle.shape == (3, 200, 2)
+
+
+def test_derivatives_pass_through_a_prediction():
+    physics = sn.load("physics-true")
+
+    def sideways(angle):
+        push = sn.Push(contact_angle=angle)
+        found = physics.predict(SCENE, SCENE.in_a_row(), push, steps=40)
+        return found.final.position[0, 1]
+
+    slope, step = float(jax.grad(sideways)(jnp.float32(0.2))), 0.02
+    difference = float(sideways(0.2 + step) - sideways(0.2 - step)) / (2 * step)
+    assert slope == pytest.approx(difference, rel=0.05)
+    assert abs(slope) > 1e-3  # m/rad
+
+
+def test_controls_predict_as_the_push_that_they_are_of(model):
+    push = sn.Push(contact_angle=0.2)
+    initial, controls = command_path(SCENE, SCENE.in_a_row(), push, steps=60)
+    one = model.predict(SCENE, initial, controls).final.position
+    other = model.predict(SCENE, SCENE.in_a_row(), push, steps=60).final.position
+    np.testing.assert_allclose(one, other, atol=1e-6)
+
+
+def test_a_slow_or_long_push_is_predicted_until_its_end():
+    physics = sn.load("physics-true")
+    slow = sn.Push(contact_angle=0.0, speed=0.025)
+    found = physics.predict(SCENE, SCENE.in_a_row(), slow)
+    assert found.states.angle.shape[0] >= 96 + 152  # 0.4 s at 1/240 s, then rest
+    end = found.final
+    way = end.pusher_position[0] - (-0.054 - 0.0048)
+    assert way == pytest.approx(0.01, abs=1e-6)
+    assert jnp.abs(end.velocity).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("push", "words"),
+    [
+        (sn.Push(contact_angle=20), "contact_angle is 20 (in degrees?)"),
+        (sn.Push(contact_angle=0, length=10), "length is 10 (in millimetres?)"),
+        (sn.Push(contact_angle=0, speed=50), "speed is 50 (in mm/s?)"),
+        (sn.Push(contact_angle=0, direction=np.nan), "direction is nan"),
+        (sn.Push(contact_angle=0, speed=0), "speed is 0"),
+    ],
+)
+def test_an_impossible_push_is_refused(push, words):
+    with pytest.raises(BadScene) as error:
+        sn.load("physics").predict(SCENE, SCENE.in_a_row(), push)
+    assert words in str(error.value)
+
+
+def test_parts_that_do_not_fit_are_refused():
+    physics = sn.load("physics")
+    three = sn.Scene.disks([1, 1, 1], [0.05, 0.05, 0.05])
+    with pytest.raises(BadScene, match="it has 3 disks, the scene 2"):
+        physics.predict(SCENE, three.in_a_row(), sn.Push(0.0))
+    two = jax.tree.map(lambda x: jnp.stack([x, x]), SCENE.in_a_row())
+    with pytest.raises(BadScene, match=r"leading axes .* are \(\), \(2,\), \(3,\)"):
+        physics.predict(SCENE, two, sn.Push(ANGLES))
+
+
+def test_networks_refuse_another_time_step():
+    fine = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059], time_step=1 / 480)
+    with pytest.raises(BadCheckpoint, match="give the scene the same time step"):
+        sn.load("in").predict(fine, fine.in_a_row(), sn.Push(0.0))
+    found = sn.load("physics").predict(fine, fine.in_a_row(), sn.Push(0.0))
+    assert found.states.angle.shape[0] == 400
+
+
+def test_a_model_outside_jax_refuses_to_be_traced():
+    def rest(scene, initial, controls):
+        return np.zeros((*controls.position.shape[:2], 2, 3))
+
+    own = sn.from_function(rest, name="rest")
+    with pytest.raises(BadInput, match="rest does not run in JAX"):
+        jax.vmap(lambda a: own.predict(SCENE, SCENE.in_a_row(), sn.Push(a)))(ANGLES)

@@ -1,0 +1,55 @@
+"""The short programs of the documentation run as they are shown."""
+
+import pytest
+
+from sainet.learning import recipes
+from support import SOURCE
+
+PREDICT = """
+import sainet as sn
+model = sn.load("sain")                                            # predict
+scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
+trajectory = model.predict(scene, scene.in_a_row(), sn.Push(contact_angle=0.2))
+"""
+OWN_DATA = """
+import sainet as sn
+train, test = sn.open_pushes("runs/recorded").split(test=0.2, seed=0)     # own data
+fitted = sn.identify(train)
+network = sn.tune("sain", train, engine=fitted)
+table = sn.evaluate({"physics": "physics", "fitted": fitted, "sain": network}, test)
+print(table.verdict()); table.to_pandas(); table.save("report.html")
+"""
+
+
+def run(program: str) -> dict[str, object]:
+    names: dict[str, object] = {}
+    exec(compile(program, str(SOURCE), "exec"), names)
+    return names
+
+
+def test_predict():
+    found = run(PREDICT)["trajectory"].final.position
+    assert found.shape == (2, 2)
+    assert 0.009 < found[0, 0] < 0.012  # m: the pusher moved by 10 mm
+    assert found[0, 1] > 0.001  # pushed from the right, the disk moves to the left
+
+
+@pytest.fixture
+def few_iterations(monkeypatch):
+    """Trainings that start as an engine take 20 iterations, not 1,200."""
+    short = recipes.RESIDUAL.changed(iterations=20)
+    monkeypatch.setitem(recipes.RECIPES, recipes.FromSimulator, short)
+
+
+@pytest.mark.slow
+def test_own_data(folder, monkeypatch, few_iterations, capsys):
+    monkeypatch.chdir(folder)
+    names = run(OWN_DATA)
+    assert "sain errs by" in capsys.readouterr().out
+    assert names["table"].to_pandas()["model"].unique().tolist() == [
+        *("physics", "fitted", "sain")
+    ]
+    assert "sain errs by" in (folder / "report.html").read_text()
+    # Nothing else was left behind.
+    assert {path.name for path in folder.iterdir()} == {"runs", "report.html"}
+    assert [path.name for path in (folder / "runs").iterdir()] == ["recorded"]
