@@ -3,7 +3,6 @@
 import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -43,7 +42,6 @@ class Gone(Executor):
         raise BrokenProcessPool
 
 
-@dataclass(frozen=True, eq=False)
 class Sum(Step[int]):
     """Adds one to the sum of its inputs, and lists what it did."""
 
@@ -60,7 +58,6 @@ class Sum(Step[int]):
         return 1 + sum(map(runner.result, self.parts))
 
 
-@dataclass(frozen=True, eq=False)
 class Note(Apart[str]):
     """Writes a file in its folder, and names the thread that did so."""
 
@@ -76,7 +73,6 @@ class Note(Apart[str]):
         return (runner.folder(self) / "note").read_text()
 
 
-@dataclass(frozen=True, eq=False)
 class Notes(Step[list[str]]):
     """Who wrote each note."""
 
@@ -109,7 +105,6 @@ def test_every_step_runs_once_after_its_inputs(tmp_path):
 
 
 def test_the_key_depends_on_type_settings_and_inputs(store):
-    @dataclass(frozen=True, eq=False)
     class Other(Sum):
         """Another step with the same fields."""
 
@@ -128,7 +123,6 @@ def test_the_key_depends_on_type_settings_and_inputs(store):
     assert Train(IN, Given(store.first(3)), CONFIG).key != Train(IN, data, CONFIG).key
 
 
-@dataclass(frozen=True, eq=False)
 class All(Step[list]):
     """The networks."""
 

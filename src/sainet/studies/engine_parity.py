@@ -4,7 +4,6 @@ The ground truth is Bullet without noise; all engines have the true properties. 
 is not isotropic: its difference from itself is the best possible result.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
@@ -67,7 +66,6 @@ def turn_state(state: State, angle: float) -> State:
     )
 
 
-@dataclass(frozen=True, eq=False)
 class TrueEngine(Step[Model]):
     """An engine with the true properties: planar, or Bullet in a rotated scene."""
 

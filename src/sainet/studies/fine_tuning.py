@@ -56,7 +56,6 @@ FEW = {"quick": 10, "paper": 25}
 _TUNED = ModelId(kind="sain", name="sain-tuned")
 
 
-@dataclass(frozen=True, eq=False)
 class Record(Step[Store]):
     """The recorded pushes of a surrogate robot."""
 

@@ -7,7 +7,6 @@ row of the mean of repetitions.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,7 +56,6 @@ _AROUND = AROUND_IDENTIFIED.identity().slug
 FLOOR = ModelId(kind="published", name="mean-of-repetitions")
 
 
-@dataclass(frozen=True, eq=False)
 class WithFloor(Step[Measurements]):
     """Errors of models on repeated pushes, beside the scatter of the repetitions."""
 

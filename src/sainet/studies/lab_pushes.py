@@ -78,7 +78,6 @@ def _mujoco(scope: Scope) -> None:
 MUJOCO: Need = _mujoco
 
 
-@dataclass(frozen=True, eq=False)
 class Collect(Apart[Store]):
     """Pushes that the robot of a virtual lab records."""
 
@@ -100,7 +99,6 @@ class Collect(Apart[Store]):
             return collect(self.config, runner.folder(self), on_pushes=bar.add)
 
 
-@dataclass(frozen=True, eq=False)
 class JoinLabs(Step[Measurements]):
     """Measurements in several labs, each of which may have several parts."""
 

@@ -5,7 +5,6 @@ the unchanged planar engine on both are compared. Nothing is trained.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,7 +31,6 @@ _HOLD = 0.4  # s
 _DRAWN = 1  # labs beside the recorded pushes in the figure
 
 
-@dataclass(frozen=True, eq=False)
 class Repeat(Derive):
     """Recorded pushes, repeated in a virtual lab."""
 
@@ -82,7 +80,6 @@ def _repeat(lab: Lab, arrays: Arrays) -> Float[np.ndarray, "push 3"]:
     return lab.capture.measured(rng, motion.pose[:, -1, 0])
 
 
-@dataclass(frozen=True, eq=False)
 class _OfEngines(Join):
     """Measurements without the model whose predictions came with recorded pushes."""
 

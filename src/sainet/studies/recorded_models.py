@@ -66,7 +66,6 @@ def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
     return {name: np.flatnonzero(owner == name) for name in dict.fromkeys(groups)}
 
 
-@dataclass(frozen=True, eq=False)
 class AroundIdentified(Step[Model]):
     """A shipped network around another engine than it was trained around."""
 

@@ -7,7 +7,7 @@ surfaces stand beside them.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -68,7 +68,6 @@ FEW = 50  # pushes of a surface that a network was not made for
 _EVERYWHERE, _FROM, _TO = "all", "abs", "plywood"
 
 
-@dataclass(frozen=True, eq=False)
 class JoinFolds(Step[Measurements]):
     """Measurements of all folds of a cross-validation."""
 
@@ -83,7 +82,6 @@ class JoinFolds(Step[Measurements]):
         return found if self.condition is None else found.in_condition(self.condition)
 
 
-@dataclass(frozen=True, eq=False)
 class BySurface(Step[Measurements]):
     """Measurements with a condition for each surface, and one for all surfaces."""
 
@@ -105,7 +103,6 @@ class BySurface(Step[Measurements]):
         return whole.in_conditions((*own, everywhere), places)
 
 
-@dataclass(frozen=True, eq=False)
 class EndErrors(Step[EndOffsets]):
     """Signed errors of an engine at the ends of pushes."""
 

@@ -1,7 +1,6 @@
 """Robustness to wrong properties and unseen conditions."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
@@ -25,7 +24,6 @@ CONTACT_DEG, DIRECTION_DEG = 75.0, 45.0
 _SEED = 11
 
 
-@dataclass(frozen=True, eq=False)
 class WrongProperties(Derive):
     """The same pushes with every mass and radius too large or too small."""
 

@@ -6,7 +6,7 @@ shipped ones.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -31,7 +31,6 @@ PLANNERS = ("greedy", "tree")
 _FACTORS = ("world", "goals", "planner", "given_properties", "disks")
 
 
-@dataclass(frozen=True, eq=False)
 class RunTrials(Step[Measurements]):
     """Control trials of models on the same goals."""
 

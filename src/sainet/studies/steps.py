@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, dataclass_transform
 
 from msgspec import structs
 
@@ -35,9 +35,18 @@ T = TypeVar("T")
 _DIGEST = 10  # characters of a hash in the name of a folder
 
 
+@dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Step(abc.ABC, Generic[T]):
-    """A piece of work: equal settings and inputs make one step, run once."""
+    """A piece of work: equal settings and inputs make one step, run once.
+
+    Its subclasses are frozen dataclasses.
+    """
+
+    def __init_subclass__(cls) -> None:
+        """Make the class a frozen dataclass."""
+        super().__init_subclass__()
+        dataclass(frozen=True, eq=False)(cls)
 
     @property
     def name(self) -> str:
@@ -70,7 +79,6 @@ class Step(abc.ABC, Generic[T]):
         return "-".join([*words.split(), self.key])
 
 
-@dataclass(frozen=True, eq=False)
 class Apart(Step[T]):
     """A step whose work other processes can do, each that of one such step."""
 
@@ -79,7 +87,6 @@ class Apart(Step[T]):
         """Do the work in the run folder, so that `run` finds it finished."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
 class Given(Step[Store]):
     """Pushes that exist before the study begins."""
 
@@ -94,7 +101,6 @@ class Given(Step[Store]):
         return self.store
 
 
-@dataclass(frozen=True, eq=False)
 class Simulate(Step[Store]):
     """A simulated dataset."""
 
@@ -117,7 +123,6 @@ class Simulate(Step[Store]):
             )
 
 
-@dataclass(frozen=True, eq=False)
 class First(Step[Store]):
     """The first pushes of a dataset."""
 
@@ -129,7 +134,6 @@ class First(Step[Store]):
         return runner.result(self.pushes).first(self.count)
 
 
-@dataclass(frozen=True, eq=False)
 class Rest(Step[Store]):
     """The pushes of a dataset after the first ones."""
 
@@ -142,7 +146,6 @@ class Rest(Step[Store]):
         return store.take(range(self.count, store.info.pushes))
 
 
-@dataclass(frozen=True, eq=False)
 class Derive(Step[Store]):
     """A dataset that a function makes of another one."""
 
@@ -158,7 +161,6 @@ class Derive(Step[Store]):
         return derive(store, folder, {"step": self.key}, self.change)
 
 
-@dataclass(frozen=True, eq=False)
 class WithBystander(Step[Store]):
     """The same pushes, beside each a disk that nothing touches."""
 
@@ -177,7 +179,6 @@ class WithBystander(Step[Store]):
             return add_bystander(store, runner.folder(self), on_pushes=bar.add)
 
 
-@dataclass(frozen=True, eq=False)
 class Load(Step[Model]):
     """A model that needs no training: physics or a shipped network."""
 
@@ -190,7 +191,6 @@ class Load(Step[Model]):
         return replace(load_model(self.source, engine=self.engine), id=self.id)
 
 
-@dataclass(frozen=True, eq=False)
 class Identify(Step[Model]):
     """Physics with parameters identified on pushes."""
 
@@ -204,7 +204,6 @@ class Identify(Step[Model]):
         return replace(load_model(str(folder)), id=self.id)
 
 
-@dataclass(frozen=True, eq=False)
 class Train(Step[Model]):
     """One training run of a network."""
 
@@ -256,7 +255,6 @@ class Train(Step[Model]):
         return replace(load_model(str(runner.folder(self))), id=self.id)
 
 
-@dataclass(frozen=True, eq=False)
 class Evaluate(Step[Measurements]):
     """Errors of models on the same pushes.
 
@@ -289,7 +287,6 @@ class Evaluate(Step[Measurements]):
         return found if self.condition is None else found.in_condition(self.condition)
 
 
-@dataclass(frozen=True, eq=False)
 class Join(Step[Measurements]):
     """Measurements of several conditions."""
 
