@@ -23,6 +23,10 @@ class Pusher(NamedTuple):
 
 
 XY = tuple[Array, Array]  # one array for each axis
+Arrays = Mapping[str, np.ndarray]  # stored, by name
+Vector = Float[Array, "*batch 2"]
+Vectors = Float[Array, "*batch time 2"]  # one for each step
+Angle = Float[Array, "*batch"]  # rad
 
 
 class Controls(eqx.Module):
@@ -42,7 +46,7 @@ class Controls(eqx.Module):
 
     @property
     @abstractmethod
-    def command(self) -> Float[Array, "*batch time 2"]:
+    def command(self) -> Vectors:
         """The command of each step, which `drive` takes: m or N."""
 
     @property
@@ -52,13 +56,11 @@ class Controls(eqx.Module):
 
     @property
     @abstractmethod
-    def pusher_path(self) -> Float[Array, "*batch time 2"] | None:
+    def pusher_path(self) -> Vectors | None:
         """Commanded pusher position (m) after each step; None: not commanded."""
 
     @abstractmethod
-    def pusher_motion(
-        self, start: Float[Array, "*batch 2"]
-    ) -> tuple[Float[Array, "*batch time 2"], Float[Array, "*batch time 2"]]:
+    def pusher_motion(self, start: Vector) -> tuple[Vectors, Vectors]:
         """Return the pusher's position (m) and velocity (m/s) without simulation.
 
         Args:
@@ -77,18 +79,18 @@ class Controls(eqx.Module):
         """
 
     @abstractmethod
-    def with_command(self, command: Float[Array, "*batch time 2"]) -> "Controls":
+    def with_command(self, command: Vectors) -> "Controls":
         """Return controls with another command, for example with errors."""
 
     @abstractmethod
-    def moved(self, offset: Float[Array, "*batch 2"]) -> "Controls":
+    def moved(self, offset: Vector) -> "Controls":
         """Return controls of a pusher displaced relative to the disks by `offset` (m).
 
         Args:
             offset: one for all pushes, or one for each.
         """
 
-    def turned(self, angle: Float[Array, "*batch"]) -> "Controls":
+    def turned(self, angle: Angle) -> "Controls":
         """Return controls turned about the table's origin (rad)."""
 
         def turn(vector: Array) -> Array:
@@ -102,9 +104,7 @@ class Controls(eqx.Module):
         return jax.tree.map(lambda vector: vector.at[..., 1].multiply(-1), self)
 
     @abstractmethod
-    def in_frame(
-        self, origin: Float[Array, "*batch 2"], angle: Float[Array, "*batch"]
-    ) -> "Controls":
+    def in_frame(self, origin: Vector, angle: Angle) -> "Controls":
         """Return controls in a frame with this origin (m) and x axis (rad)."""
 
     @abstractmethod
@@ -113,9 +113,7 @@ class Controls(eqx.Module):
 
     @classmethod
     @abstractmethod
-    def from_arrays(
-        cls, arrays: Mapping[str, np.ndarray], pusher: Pusher
-    ) -> "Controls":
+    def from_arrays(cls, arrays: Arrays, pusher: Pusher) -> "Controls":
         """Return the controls of stored pushes.
 
         Args:
@@ -127,8 +125,8 @@ class Controls(eqx.Module):
 class PathControls(Controls):
     """The pusher follows a path (the robot setup)."""
 
-    position: Float[Array, "*batch time 2"]  # m, commanded at the end of each step
-    velocity: Float[Array, "*batch time 2"]  # m/s, commanded during each step
+    position: Vectors  # m, commanded at the end of each step
+    velocity: Vectors  # m/s, commanded during each step
 
     kind: ClassVar[str] = "robot"
 
@@ -138,23 +136,21 @@ class PathControls(Controls):
         return Pusher(math.inf, 0.0)
 
     @property
-    def command(self) -> Float[Array, "*batch time 2"]:
+    def command(self) -> Vectors:
         """The position at the end of each step, m."""
         return self.position
 
     @property
-    def action(self) -> Float[Array, "*batch time 2"]:
+    def action(self) -> Vectors:
         """The commanded velocity, m/s."""
         return self.velocity
 
     @property
-    def pusher_path(self) -> Float[Array, "*batch time 2"]:
+    def pusher_path(self) -> Vectors:
         """The commanded positions, m."""
         return self.position
 
-    def pusher_motion(
-        self, start: Float[Array, "*batch 2"]
-    ) -> tuple[Float[Array, "*batch time 2"], Float[Array, "*batch time 2"]]:
+    def pusher_motion(self, start: Vector) -> tuple[Vectors, Vectors]:
         """Return the commanded positions and velocities."""
         return self.position, self.velocity
 
@@ -163,18 +159,16 @@ class PathControls(Controls):
         (x, y), (next_x, next_y) = position, command
         return (next_x - x) / time_step, (next_y - y) / time_step
 
-    def with_command(self, command: Float[Array, "*batch time 2"]) -> "PathControls":
+    def with_command(self, command: Vectors) -> "PathControls":
         """Return another path; the commanded velocity stays."""
         return PathControls(command, self.velocity)
 
-    def moved(self, offset: Float[Array, "*batch 2"]) -> "PathControls":
+    def moved(self, offset: Vector) -> "PathControls":
         """Return a displaced path."""
         offset = jnp.broadcast_to(offset[..., None, :], self.position.shape)
         return PathControls(self.position + offset, self.velocity)
 
-    def in_frame(
-        self, origin: Float[Array, "*batch 2"], angle: Float[Array, "*batch"]
-    ) -> Controls:
+    def in_frame(self, origin: Vector, angle: Angle) -> Controls:
         """Return the path in the frame."""
         return self.moved(-origin).turned(-angle)
 
@@ -183,9 +177,7 @@ class PathControls(Controls):
         return {"command_position": self.position, "command_velocity": self.velocity}
 
     @classmethod
-    def from_arrays(
-        cls, arrays: Mapping[str, np.ndarray], pusher: Pusher
-    ) -> "PathControls":
+    def from_arrays(cls, arrays: Arrays, pusher: Pusher) -> "PathControls":
         """Return the paths of stored pushes; the pusher stays on them."""
         names = ("command_position", "command_velocity")
         return cls(*(jnp.asarray(arrays[name]) for name in names))
@@ -194,8 +186,8 @@ class PathControls(Controls):
 class ForceControls(Controls):
     """A force drives the pusher against a viscous damper (the direct-force setup)."""
 
-    force: Float[Array, "*batch time 2"]  # N
-    contact_offset: Float[Array, "*batch 2"]  # m, pusher minus disk at the start
+    force: Vectors  # N
+    contact_offset: Vector  # m, pusher minus disk at the start
     pusher_mass: float = eqx.field(static=True, default=10.0)  # kg
     damping: float = eqx.field(static=True, default=1000.0)  # N s/m
 
@@ -207,7 +199,7 @@ class ForceControls(Controls):
         return Pusher(self.pusher_mass, self.damping)
 
     @property
-    def command(self) -> Float[Array, "*batch time 2"]:
+    def command(self) -> Vectors:
         """The force during each step, N."""
         return self.force
 
@@ -221,9 +213,7 @@ class ForceControls(Controls):
     def pusher_path(self) -> None:
         """None: where the pusher moves depends on the disks."""
 
-    def pusher_motion(
-        self, start: Float[Array, "*batch 2"]
-    ) -> tuple[Float[Array, "*batch time 2"], Float[Array, "*batch time 2"]]:
+    def pusher_motion(self, start: Vector) -> tuple[Vectors, Vectors]:
         """Return a pusher that stays at the start: the commands imply no motion."""
         shape = self.force.shape
         return jnp.broadcast_to(start[..., None, :], shape), jnp.zeros(shape)
@@ -235,20 +225,18 @@ class ForceControls(Controls):
         (vx, vy), (x, y) = velocity, command
         return keep * vx + gain * x, keep * vy + gain * y
 
-    def with_command(self, command: Float[Array, "*batch time 2"]) -> "ForceControls":
+    def with_command(self, command: Vectors) -> "ForceControls":
         """Return other forces."""
         return eqx.tree_at(lambda c: c.force, self, command)
 
-    def moved(self, offset: Float[Array, "*batch 2"]) -> "ForceControls":
+    def moved(self, offset: Vector) -> "ForceControls":
         """Return forces with a displaced point of contact."""
         offset = jnp.broadcast_to(offset, self.contact_offset.shape)
         return eqx.tree_at(
             lambda c: c.contact_offset, self, self.contact_offset + offset
         )
 
-    def in_frame(
-        self, origin: Float[Array, "*batch 2"], angle: Float[Array, "*batch"]
-    ) -> Controls:
+    def in_frame(self, origin: Vector, angle: Angle) -> Controls:
         """Return forces and points of contact in the frame: from its disk."""
         return self.turned(-angle)
 
@@ -257,9 +245,7 @@ class ForceControls(Controls):
         return {"force": self.force, "contact_offset": self.contact_offset}
 
     @classmethod
-    def from_arrays(
-        cls, arrays: Mapping[str, np.ndarray], pusher: Pusher
-    ) -> "ForceControls":
+    def from_arrays(cls, arrays: Arrays, pusher: Pusher) -> "ForceControls":
         """Return the forces of stored pushes."""
         force, offset = (jnp.asarray(arrays[n]) for n in ("force", "contact_offset"))
         return cls(force, offset, pusher.mass, pusher.damping)
