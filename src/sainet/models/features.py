@@ -19,7 +19,10 @@ FEATURES = ("paper", "place")
 
 @dataclass(frozen=True)
 class Block:
-    """Features that belong together; a network has them or lacks them as a whole."""
+    """Features that belong together; a network has them or lacks them as a whole.
+
+    Blocks have no fields: those of one class are equal.
+    """
 
     pair_size: ClassVar[int] = 0  # inputs of f_rel
     body_size: ClassVar[int] = 0  # inputs of f_dyn
@@ -37,7 +40,6 @@ class Block:
         return ()
 
 
-@dataclass(frozen=True)
 class Motion(Block):
     """Velocity and spin of a body."""
 
@@ -54,7 +56,6 @@ class Motion(Block):
         return (moment.motion[3:6],)
 
 
-@dataclass(frozen=True)
 class SimulatedStep(Block):
     """One step of the simulator prediction (eq. 9 and 10)."""
 
@@ -71,7 +72,6 @@ class SimulatedStep(Block):
         return (_given(moment.drive.simulated_pose_step),)
 
 
-@dataclass(frozen=True)
 class RelativeMotion(Block):
     """Offset and relative motion of two bodies."""
 
@@ -83,7 +83,6 @@ class RelativeMotion(Block):
         return (motion - jnp.roll(motion, -shift, axis=1),)
 
 
-@dataclass(frozen=True)
 class PathAction(Block):
     """Commanded pusher relative to the pushed disk; zeros for the other disks."""
 
@@ -99,7 +98,6 @@ class PathAction(Block):
         return (still.pushed[None] * action,)
 
 
-@dataclass(frozen=True)
 class ForceAction(Block):
     """Force on the pusher and initial contact offset; zeros for the other disks."""
 
@@ -110,7 +108,6 @@ class ForceAction(Block):
         return (moment.still.pushed[None] * _for_all(moment),)
 
 
-@dataclass(frozen=True)
 class Properties(Block):
     """Mass and radius, never a friction."""
 
@@ -127,7 +124,6 @@ class Properties(Block):
         return moment.still.mass[None], moment.still.radius[None]
 
 
-@dataclass(frozen=True)
 class Place(Block):
     """Place on the table, angle there, and push direction: beyond the paper.
 
