@@ -16,6 +16,8 @@ from sainet.scenes.state import State
 from sainet.worlds.config import WorldConfig
 from sainet.worlds.noise import NoiseConfig, force_error, tracking_error
 
+Pushes = Float[np.ndarray, "*push"]  # one number for each push
+Counts = Int[np.ndarray, "*push"]
 _BUCKET = 40  # steps: pushes of nearly the same length share a compilation
 
 
@@ -26,9 +28,7 @@ class AbstractSetup(ABC):
     config: WorldConfig = WorldConfig()
 
     @abstractmethod
-    def steps(
-        self, stroke: Float[np.ndarray, "*push"], speed: Float[np.ndarray, "*push"]
-    ) -> Int[np.ndarray, "*push"]:
+    def steps(self, stroke: Pushes, speed: Pushes) -> Counts:
         """Return the number of steps of pushes, from stroke (m) and speed (m/s)."""
 
     @abstractmethod
@@ -58,9 +58,7 @@ class AbstractSetup(ABC):
 class RobotSetup(AbstractSetup):
     """The pusher follows a path at constant speed, then holds."""
 
-    def steps(
-        self, stroke: Float[np.ndarray, "*push"], speed: Float[np.ndarray, "*push"]
-    ) -> Int[np.ndarray, "*push"]:
+    def steps(self, stroke: Pushes, speed: Pushes) -> Counts:
         """Return the steps of motion and of holding, rounded up to whole buckets."""
         # A hair less than exact: 48.0000001 steps of motion are 48.
         moving = np.ceil(stroke / speed / TIME_STEP - 1e-6)
@@ -85,9 +83,7 @@ class RobotSetup(AbstractSetup):
 class ForceSetup(AbstractSetup):
     """A constant force drives the pusher."""
 
-    def steps(
-        self, stroke: Float[np.ndarray, "*push"], speed: Float[np.ndarray, "*push"]
-    ) -> Int[np.ndarray, "*push"]:
+    def steps(self, stroke: Pushes, speed: Pushes) -> Counts:
         """Return the configured steps; stroke and speed have no effect."""
         return np.full(np.shape(stroke), self.config.force_steps)
 
