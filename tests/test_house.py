@@ -189,13 +189,14 @@ ROBOTS = (
     "robots/wire",
     "engines/mujoco/",
     "studies/lab",
+    "evaluation/lab",
     "control/collect",
     "cli/record",
     "robots/__init__",
 )
 WAY_IN = (
     *("api/", "control/gym", "report/live", "cli/play", "report/pictures"),
-    "report/figures/overview",
+    *("report/figures/overview", "models/push_inputs"),
 )
 
 

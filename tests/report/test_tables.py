@@ -11,9 +11,9 @@ from rich.console import Console
 
 from report import samples
 from report import test_verdicts as verdicts
+from sainet.evaluation.lab_outcomes import TrialOutcome
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Estimate, Summary
-from sainet.evaluation.trials import TrialOutcome
 from sainet.report import WRITERS
 from sainet.report.arrange import arrange
 from sainet.report.writers import (

@@ -18,9 +18,9 @@ from sainet.control.trials import measure_trials, prepare
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join
+from sainet.evaluation.lab_outcomes import OUTCOMES
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary, summarise
-from sainet.evaluation.trials import OUTCOMES
 from sainet.models.library import load_model
 from sainet.report.verdicts import trial_sentences
 from sainet.scenes.pushes import push_axis

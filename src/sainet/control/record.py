@@ -15,14 +15,7 @@ from sainet.datasets.recorded.resample import pusher_track
 from sainet.runs.documents import read_document
 from sainet.runs.errors import BadInput, shown
 from sainet.runs.folders import remake
-from sainet.scenes.quantities import (
-    MOST_DISKS,
-    PUSHER_RADIUS,
-    RADIUS,
-    Finite,
-    Friction,
-    Size,
-)
+from sainet.scenes import quantities
 from sainet.scenes.recording import Recording
 from sainet.scenes.state import State
 
@@ -34,13 +27,13 @@ _LEAST_MM = 1e-6  # length of a way
 _NO_NEARER = 10  # pushes
 
 # In mm and degrees. None: the simulation produced NaN or infinity.
-_Place = Finite | None
+_Place = quantities.Finite | None
 _Pose = Annotated[list[_Place], msgspec.Meta(min_length=3, max_length=3)]
 _Point = Annotated[list[_Place], msgspec.Meta(min_length=2, max_length=2)]
 _Positive = Annotated[float, msgspec.Meta(gt=0, le=1e6)]
 _Count = Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
-_RadiusMm = Annotated[float, RADIUS.times(1000, "mm").meta]
-_PusherRadiusMm = Annotated[float, PUSHER_RADIUS.times(1000, "mm").meta]
+_RadiusMm = Annotated[float, quantities.RADIUS.times(1000, "mm").meta]
+_PusherRadiusMm = Annotated[float, quantities.PUSHER_RADIUS.times(1000, "mm").meta]
 
 
 class StepRecord(msgspec.Struct, kw_only=True):
@@ -74,15 +67,17 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
     final_mm: _Place  # true distance of the target disk from the goal
     pushes: _Count
     final: list[_Pose]  # true pose of each disk
-    decision_s: list[Size]
-    goal_mm: Annotated[list[Finite], msgspec.Meta(min_length=2, max_length=2)]
+    decision_s: list[quantities.Size]
+    goal_mm: Annotated[
+        list[quantities.Finite], msgspec.Meta(min_length=2, max_length=2)
+    ]
     moved: _Count  # index of the target disk
     radius_mm: Annotated[
-        list[_RadiusMm], msgspec.Meta(min_length=1, max_length=MOST_DISKS)
+        list[_RadiusMm], msgspec.Meta(min_length=1, max_length=quantities.MOST_DISKS)
     ]
     pusher_radius_mm: _PusherRadiusMm
     tolerance_mm: _Positive
-    table_friction: Friction
+    table_friction: quantities.Friction
     steps: list[StepRecord] = msgspec.field(name="turns")
 
     @property

@@ -8,13 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from sainet.datasets.schema import (
-    Arrays,
-    StoreInfo,
-    input_names,
-    simulated_name,
-    variables,
-)
+from sainet.datasets import schema
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import InternalEngine, SimulatorSpec
 from sainet.runs.errors import Diverged
@@ -48,8 +42,8 @@ class PushBatch(eqx.Module):
 
 
 def to_batch(
-    arrays: Arrays,
-    info: StoreInfo,
+    arrays: schema.Arrays,
+    info: schema.StoreInfo,
     *,
     steps: int | None = None,
     simulated: str | None = None,
@@ -62,10 +56,10 @@ def to_batch(
         steps: number of steps to keep; None for all.
         simulated: internal engine whose prediction to include.
     """
-    known = variables(info)
+    known = schema.variables(info)
     timed = {name for name, each in known.items() if "time" in each.dimensions}
     # A computed prediction is no variable of the store.
-    predicted = simulated_name(simulated) if simulated else ""
+    predicted = schema.simulated_name(simulated) if simulated else ""
     cut = {
         name: array[:, :steps] if name in timed or name == predicted else array
         for name, array in arrays.items()
@@ -83,19 +77,19 @@ def to_batch(
     )
 
 
-def to_scene(arrays: Arrays, info: StoreInfo) -> Scene:
+def to_scene(arrays: schema.Arrays, info: schema.StoreInfo) -> Scene:
     """Return the scenes of stored pushes, without varying table friction."""
     known = {name: jnp.asarray(arrays[name]) for name in PROPERTIES}
     return Scene(**known, friction_field=None, time_step=info.time_step)
 
 
-def to_initial(arrays: Arrays) -> State:
+def to_initial(arrays: schema.Arrays) -> State:
     """Return the initial states of stored pushes, with the pusher at rest."""
     pusher = jnp.asarray(arrays["initial_pusher"])
     return unpack_motion(jnp.asarray(arrays["initial"]), pusher, jnp.zeros_like(pusher))
 
 
-def to_controls(arrays: Arrays, info: StoreInfo) -> Controls:
+def to_controls(arrays: schema.Arrays, info: schema.StoreInfo) -> Controls:
     """Return the controls of stored pushes."""
     pusher = Pusher(info.pusher_mass, info.damping)
     return CONTROLS[info.kind].from_arrays(arrays, pusher)
@@ -116,32 +110,32 @@ class Prediction:
     """
 
     internal: InternalEngine
-    info: StoreInfo  # of the pushes
+    info: schema.StoreInfo  # of the pushes
 
     @property
     def name(self) -> str:
         """The name of its array."""
-        return simulated_name(self.internal.simulator.stored_as)
+        return schema.simulated_name(self.internal.simulator.stored_as)
 
     @property
     def is_stored(self) -> bool:
         """Whether the store contains the prediction."""
         # A camera offset displaces the pusher.
-        return not self.internal.camera and self.name in variables(self.info)
+        return not self.internal.camera and self.name in schema.variables(self.info)
 
     @property
     def names(self) -> tuple[str, ...]:
         """The arrays of the store that a batch with the prediction reads."""
         stored = (self.name,) if self.is_stored else ()
-        return (*input_names(self.info), *stored)
+        return (*schema.input_names(self.info), *stored)
 
-    def complete(self, arrays: Arrays) -> Arrays:
+    def complete(self, arrays: schema.Arrays) -> schema.Arrays:
         """Return arrays with the prediction, computed if they lack it."""
         if self.name in arrays:
             return arrays
         return arrays | {self.name: _roll_out(self.internal, arrays, self.info)}
 
-    def batch(self, arrays: Arrays, steps: int | None = None) -> PushBatch:
+    def batch(self, arrays: schema.Arrays, steps: int | None = None) -> PushBatch:
         """Return a batch with the prediction, its pusher in camera coordinates.
 
         Args:
@@ -156,7 +150,10 @@ class Prediction:
 
 
 def simulate(
-    simulator: SimulatorSpec, arrays: Arrays, info: StoreInfo, pushes: Sequence[str]
+    simulator: SimulatorSpec,
+    arrays: schema.Arrays,
+    info: schema.StoreInfo,
+    pushes: Sequence[str],
 ) -> Float[np.ndarray, "push time body 6"]:
     """Return the packed motion that a simulator predicts (s-bar).
 
@@ -176,7 +173,7 @@ def simulate(
 
 
 def _roll_out(
-    internal: InternalEngine, arrays: Arrays, info: StoreInfo
+    internal: InternalEngine, arrays: schema.Arrays, info: schema.StoreInfo
 ) -> Float[np.ndarray, "push time body 6"]:
     moved = _as_measured(internal, to_initial(arrays), to_controls(arrays, info))
     engine, scene = internal.simulator.build(), to_scene(arrays, info)

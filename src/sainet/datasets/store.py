@@ -11,16 +11,8 @@ import numpy as np
 from jaxtyping import Int, UInt64
 from msgspec import structs
 
+from sainet.datasets import schema
 from sainet.datasets.check import check_files, check_values, read_info
-from sainet.datasets.schema import (
-    ARRAYS,
-    HASHES,
-    Arrays,
-    Listing,
-    StoreInfo,
-    Variable,
-    variables,
-)
 from sainet.runs.digests import BYTES
 from sainet.runs.documents import content_hash, read_document, read_file, readable
 from sainet.runs.errors import BadInput, BadStore, hint, shown
@@ -32,7 +24,7 @@ class Store:
     """A complete, undamaged dataset of pushes."""
 
     path: Path
-    info: StoreInfo
+    info: schema.StoreInfo
     rows: tuple[int, ...] | None = None  # of the chosen pushes; None: all
 
     def first(self, pushes: int) -> "Store":
@@ -97,7 +89,9 @@ class Store:
         import zarr
 
         # Consolidated metadata would be a second, unchecked description.
-        return zarr.open_group(self.path / ARRAYS, mode="r", use_consolidated=False)
+        return zarr.open_group(
+            self.path / schema.ARRAYS, mode="r", use_consolidated=False
+        )
 
     def read(
         self, pushes: slice, names: tuple[str, ...] | None = None
@@ -107,7 +101,7 @@ class Store:
         Raises:
             BadStore: a chunk is damaged, or a value is out of range.
         """
-        chosen = names or tuple(variables(self.info))
+        chosen = names or tuple(schema.variables(self.info))
         rows = np.arange(self.info.pushes)[pushes]
         if not self._is_prefix:
             rows = np.asarray(self.rows)[rows]
@@ -128,7 +122,7 @@ class Store:
             return array.oindex[rows]
         except (RuntimeError, ValueError, TypeError, OSError, MemoryError) as error:
             raise BadStore(
-                f"{self.path / ARRAYS / name}: a chunk is damaged "
+                f"{self.path / schema.ARRAYS / name}: a chunk is damaged "
                 f"({shown(error)}); {remake(self.path)}."
             ) from None
 
@@ -143,7 +137,9 @@ class Store:
         import (masses, frictions), simulator predictions or the other pushes.
         """
         info = self.info
-        known = {n: each for n, each in variables(info).items() if each.is_hashed}
+        known = {
+            n: each for n, each in schema.variables(info).items() if each.is_hashed
+        }
         parts = [info.chunk_slice(index) for index in range(info.chunks)]
         read = (self.read(part, tuple(known)) for part in parts)
         return np.concatenate([_hash_pushes(arrays, known) for arrays in read])
@@ -151,7 +147,7 @@ class Store:
     @property
     def content(self) -> str:
         """The hash of the content, as model cards record it."""
-        whole = content_hash(read_file(self.path / HASHES, error=BadStore))
+        whole = content_hash(read_file(self.path / schema.HASHES, error=BadStore))
         if self.rows is None:
             return whole
         chosen = len(self.rows) if self._is_prefix else self.rows
@@ -159,7 +155,7 @@ class Store:
 
 
 def _hash_pushes(
-    arrays: Arrays, known: Mapping[str, Variable]
+    arrays: schema.Arrays, known: Mapping[str, schema.Variable]
 ) -> UInt64[np.ndarray, " push"]:
     hashes = np.empty(len(arrays["steps"]), np.uint64)
     for row, count in enumerate(arrays["steps"]):
@@ -192,13 +188,15 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
                 f"{folder}: no such dataset; make one with 'sainet generate' or "
                 "'import'."
             )
-        if not (folder / HASHES).exists():
+        if not (folder / schema.HASHES).exists():
             raise BadStore(
-                f"{folder / HASHES}: missing, so the dataset is unfinished; run the "
-                "command that made it again to resume it."
+                f"{folder / schema.HASHES}: missing, so the dataset is unfinished; run "
+                "the command that made it again to resume it."
             )
     remedy = remake(folder)
-    listing = read_document(folder / HASHES, Listing, error=BadStore, remedy=remedy)
+    listing = read_document(
+        folder / schema.HASHES, schema.Listing, error=BadStore, remedy=remedy
+    )
     info = read_info(folder)
     check_files(folder, info, listing.files, verify=verify)
     return Store(folder, info)

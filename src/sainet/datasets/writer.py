@@ -9,16 +9,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from sainet.datasets.schema import (
-    ARRAYS,
-    HASHES,
-    Arrays,
-    Hashes,
-    Listing,
-    StoreInfo,
-    chunk_file,
-    variables,
-)
+from sainet.datasets import schema
 from sainet.datasets.store import Store, open_store
 from sainet.runs import documents
 from sainet.runs.errors import BadInput
@@ -27,13 +18,13 @@ from sainet.runs.workers import each_done
 
 PROGRESS = "progress"
 _log = logging.getLogger(__name__)
-MakeChunk = Callable[[int], Arrays]  # of an index
+MakeChunk = Callable[[int], schema.Arrays]  # of an index
 
 
 def write_once(
     out: Path,
     settings: Mapping[str, object],
-    info: StoreInfo,
+    info: schema.StoreInfo,
     make_chunk: MakeChunk,
     *,
     executor: Executor | None = None,
@@ -53,7 +44,9 @@ def write_once(
         RunConflict: the folder belongs to another run, or another process uses it.
         BadInput: the disk is full.
     """
-    folder = open_run(out, settings, finished_by=HASHES)  # locked as long as it exists
+    folder = open_run(
+        out, settings, finished_by=schema.HASHES
+    )  # locked as long as it exists
     if folder.is_finished:
         _log.info("%s is finished already", out)
         _clear_progress(out)
@@ -66,7 +59,7 @@ def derive(
     store: Store,
     out: Path,
     settings: Mapping[str, object],
-    change: Callable[[Arrays], Arrays],
+    change: Callable[[schema.Arrays], schema.Arrays],
 ) -> Store:
     """Return a dataset that a function makes of another dataset; written once.
 
@@ -81,7 +74,7 @@ def derive(
         RunConflict: the folder belongs to another run.
     """
     known = {"command": "derive", "data": store.content, **settings}
-    folder = open_run(out, known, finished_by=HASHES)
+    folder = open_run(out, known, finished_by=schema.HASHES)
     if not folder.is_finished:
         arrays = change(store.read(slice(None)))
         pushes, bodies = arrays["mass"].shape
@@ -90,14 +83,14 @@ def derive(
     return open_store(out)
 
 
-def write_store(folder: Path, info: StoreInfo, arrays: Arrays) -> None:
+def write_store(folder: Path, info: schema.StoreInfo, arrays: schema.Arrays) -> None:
     """Write a store whose arrays are in memory.
 
     Raises:
         BadInput: the disk is full, or a property of the dataset is out of range.
     """
 
-    def part(index: int) -> Arrays:
+    def part(index: int) -> schema.Arrays:
         return {name: a[info.chunk_slice(index)] for name, a in arrays.items()}
 
     _write(folder, info, part, None, lambda pushes: None)
@@ -105,7 +98,7 @@ def write_store(folder: Path, info: StoreInfo, arrays: Arrays) -> None:
 
 def _write(
     folder: Path,
-    info: StoreInfo,
+    info: schema.StoreInfo,
     make_chunk: MakeChunk,
     executor: Executor | None,
     on_pushes: Callable[[int], None],
@@ -117,26 +110,26 @@ def _write(
     jobs = [(folder, info, index, make_chunk) for index in missing]
     for index in each_done(executor, write_chunk, jobs):
         on_pushes(info.chunk_length(index))
-    hashes: Hashes = {}
+    hashes: schema.Hashes = {}
     for index in range(info.chunks):
-        hashes |= documents.read_document(_receipt(folder, index), Listing).files
-    for path in sorted((folder / ARRAYS).rglob("zarr.json")):
-        name = path.relative_to(folder / ARRAYS).as_posix()
+        hashes |= documents.read_document(_receipt(folder, index), schema.Listing).files
+    for path in sorted((folder / schema.ARRAYS).rglob("zarr.json")):
+        name = path.relative_to(folder / schema.ARRAYS).as_posix()
         hashes[name] = documents.content_hash(path.read_bytes())
-    documents.write_document(folder / HASHES, Listing(files=hashes))
+    documents.write_document(folder / schema.HASHES, schema.Listing(files=hashes))
     _clear_progress(folder)
 
 
-def _create_arrays(folder: Path, info: StoreInfo) -> None:
+def _create_arrays(folder: Path, info: schema.StoreInfo) -> None:
     """Create the empty arrays of a store; repeated calls give the same bytes."""
     import zarr
     from zarr.codecs import ZstdCodec
 
     attributes = msgspec.to_builtins(documents.checked(info, folder))
     try:
-        group = zarr.open_group(folder / ARRAYS, mode="a", attributes=None)
+        group = zarr.open_group(folder / schema.ARRAYS, mode="a", attributes=None)
         group.attrs.put(attributes)
-        for name, variable in variables(info).items():
+        for name, variable in schema.variables(info).items():
             if name in group:
                 continue
             group.create_array(
@@ -151,54 +144,57 @@ def _create_arrays(folder: Path, info: StoreInfo) -> None:
                 config={"write_empty_chunks": True},
             )
     except OSError as error:
-        raise documents.write_error(folder / ARRAYS, error) from error
+        raise documents.write_error(folder / schema.ARRAYS, error) from error
 
 
 def write_chunk(
-    folder: Path, info: StoreInfo, index: int, make_chunk: MakeChunk
+    folder: Path, info: schema.StoreInfo, index: int, make_chunk: MakeChunk
 ) -> int:
     """Make and write one chunk of every array, then its receipt; return its index."""
     import zarr
 
     arrays = make_chunk(index)
     try:
-        group = zarr.open_group(folder / ARRAYS, mode="r+")
+        group = zarr.open_group(folder / schema.ARRAYS, mode="r+")
         with zarr.config.set({"array.write_empty_chunks": True}):
-            for name, variable in variables(info).items():
+            for name, variable in schema.variables(info).items():
                 value = np.asarray(arrays[name], variable.dtype)
                 group[name][info.chunk_slice(index)] = value  # pyright: ignore
     except OSError as error:
-        raise documents.write_error(folder / ARRAYS, error) from error
+        raise documents.write_error(folder / schema.ARRAYS, error) from error
     hashes = {
-        name: documents.content_hash((folder / ARRAYS / name).read_bytes())
+        name: documents.content_hash((folder / schema.ARRAYS / name).read_bytes())
         for name in chunk_files(info, index)
     }
-    documents.write_document(_receipt(folder, index), Listing(files=hashes))
+    documents.write_document(_receipt(folder, index), schema.Listing(files=hashes))
     return index
 
 
-def chunk_files(info: StoreInfo, index: int) -> list[str]:
+def chunk_files(info: schema.StoreInfo, index: int) -> list[str]:
     """Return the files of one chunk, relative to the folder of the arrays."""
-    return [chunk_file(name, each, index) for name, each in variables(info).items()]
+    return [
+        schema.chunk_file(name, each, index)
+        for name, each in schema.variables(info).items()
+    ]
 
 
-def missing_chunks(folder: Path, info: StoreInfo) -> list[int]:
+def missing_chunks(folder: Path, info: schema.StoreInfo) -> list[int]:
     """Return the chunks that are not written yet.
 
     A chunk is complete if its receipt exists and its files match the receipt.
     Remains of an interrupted writer are removed.
     """
-    for leftover in (folder / ARRAYS).rglob("*.partial"):
+    for leftover in (folder / schema.ARRAYS).rglob("*.partial"):
         leftover.unlink(missing_ok=True)
     return [i for i in range(info.chunks) if not _is_written(folder, info, i)]
 
 
-def _is_written(folder: Path, info: StoreInfo, index: int) -> bool:
+def _is_written(folder: Path, info: schema.StoreInfo, index: int) -> bool:
     try:
-        receipt = documents.read_document(_receipt(folder, index), Listing).files
+        receipt = documents.read_document(_receipt(folder, index), schema.Listing).files
     except BadInput:
         return False
-    paths = {name: folder / ARRAYS / name for name in chunk_files(info, index)}
+    paths = {name: folder / schema.ARRAYS / name for name in chunk_files(info, index)}
     return all(
         path.is_file()
         and documents.content_hash(path.read_bytes()) == receipt.get(name)

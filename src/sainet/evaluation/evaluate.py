@@ -12,24 +12,7 @@ from sainet.datasets.batch import Prediction, PushBatch, to_batch
 from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
-from sainet.evaluation.measurements import (
-    Condition,
-    Header,
-    Measurements,
-    Provenance,
-    TestSet,
-    TrainingRun,
-    measurements_of,
-)
-from sainet.evaluation.metrics import (
-    MEASURED,
-    REFERENCE_DISTANCE,
-    Errors,
-    final_errors,
-    final_pose,
-    push_errors,
-    travel_mm,
-)
+from sainet.evaluation import measurements, metrics
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
@@ -48,7 +31,7 @@ def evaluate(
     steps: int | None = None,
     force: bool = False,
     on_pushes: OnPushes = lambda model, pushes: None,
-) -> Measurements:
+) -> measurements.Measurements:
     """Predict every stored push with every model and measure the errors.
 
     Args:
@@ -113,7 +96,7 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
     arrays, truths = pushes.arrays, pushes.truths()
     poses = _predict_all(model, pushes, lambda name, count: None)
     predicted = [
-        final_pose(p, seen) for p, (_, seen) in zip(poses, truths, strict=True)
+        metrics.final_pose(p, seen) for p, (_, seen) in zip(poses, truths, strict=True)
     ]
     missed = (pushes.final - pushes.in_order(predicted))[:, 0]
     last = arrays["command_position"][np.arange(len(missed)), arrays["steps"] - 1]
@@ -163,13 +146,15 @@ class _Pushes:
     @cached_property
     def final(self) -> Float[np.ndarray, "push body 3"]:
         """The last observed pose of each push."""
-        return self.in_order([final_pose(*truth) for truth in self.truths()])
+        return self.in_order([metrics.final_pose(*truth) for truth in self.truths()])
 
-    def errors(self, poses: Sequence[np.ndarray]) -> Errors:
+    def errors(self, poses: Sequence[np.ndarray]) -> metrics.Errors:
         """Return the errors of the predicted poses of each part."""
         pairs = zip(poses, self.truths(), strict=True)
-        found = [push_errors(predicted, *truth) for predicted, truth in pairs]
-        return {name: self.in_order([e[name] for e in found]) for name in MEASURED}
+        found = [metrics.push_errors(predicted, *truth) for predicted, truth in pairs]
+        return {
+            name: self.in_order([e[name] for e in found]) for name in metrics.MEASURED
+        }
 
 
 def _limit(store: Store, steps: int | None) -> int:
@@ -183,14 +168,14 @@ def _limit(store: Store, steps: int | None) -> int:
     return steps or store.info.steps
 
 
-def _errors(model: Model, pushes: _Pushes, on_pushes: OnPushes) -> Errors:
+def _errors(model: Model, pushes: _Pushes, on_pushes: OnPushes) -> metrics.Errors:
     store, longest = pushes.store, max(steps for _, steps in pushes.parts)
     given = model.dynamics.recall(store.push_hashes, longest, store.info.bodies)
     if given is None:
         return pushes.errors(_predict_all(model, pushes, on_pushes))
     on_pushes(model.name, len(given))
     if given.ndim == pushes.final.ndim:
-        return final_errors(given, pushes.final)
+        return metrics.final_errors(given, pushes.final)
     return pushes.errors([given[part, :steps] for part, steps in pushes.parts])
 
 
@@ -251,46 +236,53 @@ def _predict_pose(
 
 
 def _measurements(
-    models: Sequence[Model], pushes: _Pushes, errors: list[Errors]
-) -> Measurements:
+    models: Sequence[Model], pushes: _Pushes, errors: list[metrics.Errors]
+) -> measurements.Measurements:
     store, arrays, final = pushes.store, pushes.arrays, pushes.final
     errors = errors + [
-        final_errors(arrays[published_name(name)].astype(np.float64), final)
+        metrics.final_errors(arrays[published_name(name)].astype(np.float64), final)
         for name in store.info.published
     ]
     groups = store.info.groups
     labels = sorted({groups[code] for code in arrays["group"]}) if groups else [""]
     places = [labels.index(groups[code] if groups else "") for code in arrays["group"]]
     rows = np.arange(store.info.pushes) if store.rows is None else np.array(store.rows)
-    return measurements_of(
-        {name: np.stack([each[name][None] for each in errors]) for name in MEASURED},
-        travel_mm(arrays["initial"][..., :3].astype(np.float64), final),
+    return measurements.measurements_of(
+        {
+            name: np.stack([each[name][None] for each in errors])
+            for name in metrics.MEASURED
+        },
+        metrics.travel_mm(arrays["initial"][..., :3].astype(np.float64), final),
         _header(models, store, labels),
         condition=np.array(places),
         row=rows,
     )
 
 
-def _header(models: Sequence[Model], store: Store, labels: Sequence[str]) -> Header:
+def _header(
+    models: Sequence[Model], store: Store, labels: Sequence[str]
+) -> measurements.Header:
     published = store.info.published
     kind = "recorded" if store.info.is_recorded else "simulated"
-    return Header(
+    return measurements.Header(
         models=(
             *(model.id for model in models),
             *(ModelId(kind="published", name=name) for name in published),
         ),
         predictions=tuple(published),
-        conditions=tuple(Condition(label=label) for label in labels),
-        reference_m=REFERENCE_DISTANCE[kind],
-        provenance=Provenance(
-            tests=tuple(TestSet(condition=c, data=store.content) for c in labels),
+        conditions=tuple(measurements.Condition(label=label) for label in labels),
+        reference_m=metrics.REFERENCE_DISTANCE[kind],
+        provenance=measurements.Provenance(
+            tests=tuple(
+                measurements.TestSet(condition=c, data=store.content) for c in labels
+            ),
             trainings=tuple(_training(m.name, m.card) for m in models if m.card),
         ),
     )
 
 
-def _training(name: str, card: Card) -> TrainingRun:
-    return TrainingRun(
+def _training(name: str, card: Card) -> measurements.TrainingRun:
+    return measurements.TrainingRun(
         model=name,
         seed=card.recipe.seed,
         weights=card.weights,

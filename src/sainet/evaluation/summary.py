@@ -6,24 +6,16 @@ from itertools import combinations
 import msgspec
 import numpy as np
 
+from sainet.evaluation import measurements
 from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
-from sainet.evaluation.measurements import (
-    Condition,
-    Measurements,
-    Provenance,
-    PublishedValues,
-)
-from sainet.evaluation.metrics import MEASURED, METRICS, ModelErrors
-from sainet.evaluation.trials import (
+from sainet.evaluation.lab_outcomes import (
     TrialDifference,
     TrialOutcome,
-    TrialRow,
-    TrialTest,
-    compare_trials,
     trial_differences,
     trial_outcomes,
-    trial_rows,
 )
+from sainet.evaluation.metrics import MEASURED, METRICS, ModelErrors
+from sainet.evaluation.trials import TrialRow, TrialTest, compare_trials, trial_rows
 from sainet.models.identity import ModelId
 
 
@@ -65,7 +57,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     """Everything that tables, figures and claims read."""
 
     models: tuple[ModelId, ...]
-    conditions: tuple[Condition, ...] = (Condition(),)
+    conditions: tuple[measurements.Condition, ...] = (measurements.Condition(),)
     rows: tuple[Row, ...] = ()
     predictions: tuple[Row, ...] = ()  # published predictions of the same pushes
     comparisons: tuple[Comparison, ...] = ()
@@ -74,8 +66,8 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
     tests: tuple[TrialTest, ...] = ()
     outcomes: tuple[TrialOutcome, ...] = ()  # of trials in labs
     differences: tuple[TrialDifference, ...] = ()
-    published: tuple[PublishedValues, ...] = ()
-    provenance: Provenance = Provenance()
+    published: tuple[measurements.PublishedValues, ...] = ()
+    provenance: measurements.Provenance = measurements.Provenance()
 
     @property
     def is_of_trials(self) -> bool:
@@ -97,7 +89,7 @@ class Summary(msgspec.Struct, frozen=True, kw_only=True):
 BASELINE = "physics"
 
 
-def summarise(measured: Measurements, *, subject: str = "") -> Summary:
+def summarise(measured: measurements.Measurements, *, subject: str = "") -> Summary:
     """Return means, intervals and paired comparisons.
 
     Args:
@@ -144,7 +136,7 @@ def summarise(measured: Measurements, *, subject: str = "") -> Summary:
     )
 
 
-def _of_trials(measured: Measurements, found: Summary) -> Summary:
+def _of_trials(measured: measurements.Measurements, found: Summary) -> Summary:
     return msgspec.structs.replace(
         found,
         trials=trial_rows(measured),
@@ -154,7 +146,7 @@ def _of_trials(measured: Measurements, found: Summary) -> Summary:
     )
 
 
-def _pairs(measured: Measurements, subject: str) -> list[tuple[str, str]]:
+def _pairs(measured: measurements.Measurements, subject: str) -> list[tuple[str, str]]:
     predictions = measured.header.predictions
     ours = [slug for slug in measured.slugs if slug not in predictions]
     if subject:
@@ -166,7 +158,9 @@ def _pairs(measured: Measurements, subject: str) -> list[tuple[str, str]]:
 class _Part:
     """The pushes of one condition."""
 
-    def __init__(self, measured: Measurements, condition: Condition) -> None:
+    def __init__(
+        self, measured: measurements.Measurements, condition: measurements.Condition
+    ) -> None:
         self.condition = condition
         part = measured.samples_of(condition)
         travel = measured.data["travel_mm"].values[part]
@@ -187,7 +181,7 @@ class _Part:
         return list(self.models)
 
     def _errors(
-        self, measured: Measurements, slug: str, part: np.ndarray
+        self, measured: measurements.Measurements, slug: str, part: np.ndarray
     ) -> ModelErrors | None:
         found = {name: measured.values(name, slug)[..., part, :] for name in MEASURED}
         trained = max((v.shape[0] for v in found.values() if v.ndim > 2), default=1)  # noqa: PLR2004

@@ -5,15 +5,14 @@ from itertools import combinations
 
 import msgspec
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 from scipy.stats import binomtest
 
-from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
 
 # What an episode reaches or does not.
 MEASURES = ("solved", "within_4_mm", "within_25_pushes")
-_NEAR_MM, _VERY_NEAR_MM = 4.0, 2.0
+_NEAR_MM = 4.0
 _FEW_PUSHES = 25
 
 
@@ -51,31 +50,13 @@ class TrialTest(msgspec.Struct, frozen=True, kw_only=True):
     p: float
 
 
-class TrialOutcome(msgspec.Struct, frozen=True, kw_only=True):
-    """Means over the trials of one model in one condition, in several labs."""
-
-    condition: str
-    model: str  # slug
-    values: dict[str, Estimate]  # by the names in `OUTCOMES`
-
-
-class TrialDifference(msgspec.Struct, frozen=True, kw_only=True):
-    """A paired difference of two models: the first minus the other."""
-
-    condition: str
-    measure: str  # one of `OUTCOMES`
-    model: str
-    against: str
-    difference: Estimate
-
-
 def trial_rows(measured: Measurements) -> tuple[TrialRow, ...]:
     """Return success with its interval, medians and shares, condition by condition."""
     return tuple(
         _row(measured, slug, condition)
         for condition in measured.header.conditions
         for slug in measured.slugs
-        if _was_tried(measured, slug, condition)
+        if was_tried(measured, slug, condition)
     )
 
 
@@ -88,7 +69,8 @@ def compare_trials(measured: Measurements) -> tuple[TrialTest, ...]:
     )
 
 
-def _was_tried(measured: Measurements, slug: str, condition: Condition) -> bool:
+def was_tried(measured: Measurements, slug: str, condition: Condition) -> bool:
+    """Return whether a model has trials in a condition."""
     part = measured.samples_of(condition)
     return bool(np.isfinite(measured.values("solved", slug)[part]).any())
 
@@ -137,7 +119,7 @@ def reached(
 
 
 def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
-    tried = [s for s in measured.slugs if _was_tried(measured, s, condition)]
+    tried = [s for s in measured.slugs if was_tried(measured, s, condition)]
     for measure in MEASURES:
         found = {s: reached(measured, s, condition, measure) for s in tried}
         for against, model in combinations(tried, 2):
@@ -154,55 +136,3 @@ def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
                 only_other=int(only_other),
                 p=float(p),
             )
-
-
-# Means over labs and trials: shares of trials, a number of pushes, a distance.
-OUTCOMES = ("solved", "within_2_mm", "pushes", "overshoot_mm", "stuck")
-
-
-def trial_outcomes(measured: Measurements) -> Iterator[TrialOutcome]:
-    """Yield the means of every outcome with their intervals over labs and trials."""
-    for condition, samples in _in_labs(measured):
-        for slug, sample in samples.items():
-            found = sample.interval
-            values = {name: estimate(found, n) for n, name in enumerate(OUTCOMES)}
-            yield TrialOutcome(condition=condition.label, model=slug, values=values)
-
-
-def trial_differences(measured: Measurements) -> Iterator[TrialDifference]:
-    """Yield the paired differences of every pair of models, for each outcome."""
-    for condition, samples in _in_labs(measured):
-        for against, model in combinations(samples, 2):
-            found = samples[model].minus(samples[against])
-            for number, name in enumerate(OUTCOMES):
-                yield TrialDifference(
-                    condition=condition.label,
-                    measure=name,
-                    model=model,
-                    against=against,
-                    difference=estimate(found, number),
-                )
-
-
-def _in_labs(measured: Measurements) -> Iterator[tuple[Condition, dict[str, Sample]]]:
-    """Yield the outcomes of every model by condition, if they are of labs."""
-    for condition in measured.header.conditions if measured.header.has_labs else ():
-        part = measured.samples_of(condition)
-        folds = folds_of(measured.data["fold"].values[part], are_labs=True)
-        yield (
-            condition,
-            {
-                slug: Sample(_outcomes(measured, slug)[part], folds)
-                for slug in measured.slugs
-                if _was_tried(measured, slug, condition)
-            },
-        )
-
-
-def _outcomes(measured: Measurements, slug: str) -> Float[np.ndarray, "trial outcome"]:
-    near = measured.values("final_mm", slug) <= _VERY_NEAR_MM
-    columns = [
-        near if name == "within_2_mm" else measured.values(name, slug)
-        for name in OUTCOMES
-    ]
-    return np.column_stack(columns).astype(np.float64)

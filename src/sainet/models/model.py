@@ -2,14 +2,9 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-import equinox as eqx
-import jax
-import jax.numpy as jnp
 import msgspec
 import numpy as np
-from jax.core import Tracer
 from jaxtyping import UInt64
 
 from sainet.engines.simulator import InternalEngine
@@ -21,22 +16,13 @@ from sainet.models.dynamics import (
     predict,
 )
 from sainet.models.identity import ModelId
+from sainet.models.push_inputs import commanded, is_traced, steps_of
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
-from sainet.scenes.controls import Controls, PathControls
-from sainet.scenes.pushes import Push, command_path
-from sainet.scenes.quantities import CONTACT_ANGLE, DIRECTION, SPEED, STROKE
-from sainet.scenes.scene import TIME_STEP, Scene
+from sainet.scenes.controls import Controls
+from sainet.scenes.pushes import Push
+from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
-from sainet.worlds.setups import RobotSetup
-
-_USUAL_STEPS = 200  # of a push whose length or speed is traced
-_PARAMETERS = {
-    "contact_angle": CONTACT_ANGLE,
-    "direction": DIRECTION,
-    "length": STROKE,
-    "speed": SPEED,
-}
 
 
 @dataclass(frozen=True)
@@ -109,15 +95,14 @@ class Model:
             raise BadScene(
                 f"state: it has {state.body_count} disks, the scene {scene.body_count}."
             )
-        if self.dynamics.on_host and _is_traced((scene, state, push)):
+        if self.dynamics.on_host and is_traced((scene, state, push)):
             raise BadInput(
                 f"{self.name} does not run in JAX, which cannot trace it; give a batch "
                 "of pushes."
             )
         if isinstance(push, Push):
-            steps = _steps_of(push, scene.time_step) if steps is None else steps
-            scene, state, push = _together(scene, state, push)
-            state, push = _command(scene, state, push, steps)
+            steps = steps_of(push, scene.time_step) if steps is None else steps
+            scene, state, push = commanded(scene, state, push, steps)
         check_purpose(self.dynamics, push.kind, scene.time_step)
         return predict(self.dynamics, scene, state, push)
 
@@ -162,49 +147,3 @@ class Model:
                 f"{path}: the network was trained on {seen} of these {len(pushes)} "
                 "pushes. Test it on others ('sainet split'), or give `force`."
             )
-
-
-def _is_traced(tree: object) -> bool:
-    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
-
-
-def _steps_of(push: Push, time_step: float) -> int:
-    """Return the steps until every push has ended and the disks rest."""
-    for name, quantity in _PARAMETERS.items():
-        value = getattr(push, name)
-        if not _is_traced(value):
-            quantity.check(value, f"push: {name}", error=BadScene)
-    if _is_traced((push.length, push.speed)):
-        return _USUAL_STEPS
-    # Single-precision numbers as they were meant: 0.05, not 0.0500000007.
-    given = np.array([push.length, push.speed], np.float64)
-    length, speed = np.round(given.reshape(2, -1), 7)
-    steps = RobotSetup().steps(length, speed).max()
-    return int(np.ceil(steps * TIME_STEP / time_step - 1e-6))
-
-
-def _together(scene: Scene, state: State, push: Push) -> tuple[Scene, State, Push]:
-    """Return the parts with equal leading axes."""
-    parts = (scene, state, push)
-    own = scene.batch_shape, state.angle.shape[:-1], push.speed.shape
-    try:
-        shape = np.broadcast_shapes(*own)
-    except ValueError:
-        names = ", ".join(map(str, own))
-        raise BadScene(
-            f"push: the leading axes of scene, state and push are {names}; give equal "
-            "ones, or none."
-        ) from None
-
-    def widened(part: Any, axes: int) -> Any:  # noqa: ANN401
-        return jax.tree.map(lambda x: jnp.broadcast_to(x, shape + x.shape[axes:]), part)
-
-    found = (widened(*pair) for pair in zip(parts, map(len, own), strict=True))
-    return tuple(found)
-
-
-@eqx.filter_jit
-def _command(
-    scene: Scene, state: State, push: Push, steps: int
-) -> tuple[State, PathControls]:
-    return command_path(scene, state, push, steps=steps)

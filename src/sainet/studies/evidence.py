@@ -7,13 +7,7 @@ import msgspec
 from sainet.evaluation.measurements import read_measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import IDENTIFIED, Identified, read_identified
-from sainet.runs.documents import (
-    read_document,
-    read_file,
-    read_json,
-    write_bytes,
-    write_document,
-)
+from sainet.runs import documents
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
@@ -56,18 +50,20 @@ class Evidence:
                 summary(read_measurements(measured))
                 if measured.is_file()
                 # Of version 0.1.0, until the study is measured again.
-                else read_document(self.folder / f"{name}.json", Summary)
+                else documents.read_document(self.folder / f"{name}.json", Summary)
             )
         return self._summaries[name]
 
     def benchmark(self, case: str) -> Benchmark:
         """Return the figures of a benchmark case."""
-        return read_document(self.folder / f"bench-{case}.json", Benchmark)
+        return documents.read_document(self.folder / f"bench-{case}.json", Benchmark)
 
     def identifications(self) -> dict[str, Identification]:
         """Return the parameters identified on each group of recorded pushes."""
         paths = sorted((self.folder / _IDENTIFIED).glob("*.json"))
-        return {path.stem: read_document(path, Identification) for path in paths}
+        return {
+            path.stem: documents.read_document(path, Identification) for path in paths
+        }
 
 
 def described(machine: Manifest) -> str:
@@ -90,21 +86,21 @@ def keep(path: Path, root: Path) -> None:
     results = root / RESULTS
     if path.is_file():
         for case, figures in _cases(path).items():
-            write_document(results / f"bench-{case}.json", figures)
+            documents.write_document(results / f"bench-{case}.json", figures)
         return
     if (path / IDENTIFIED).is_file():
-        made = read_document(path / MANIFEST, Manifest)
+        made = documents.read_document(path / MANIFEST, Manifest)
         found = Identification(read_identified(path), made)
-        write_document(results / _IDENTIFIED / f"{path.name}.json", found)
+        documents.write_document(results / _IDENTIFIED / f"{path.name}.json", found)
         return
-    study = read_json(path / CONFIG).get("study", path.name)
+    study = documents.read_json(path / CONFIG).get("study", path.name)
     for file, name in ((MEASUREMENTS, f"{study}"), (AS_TRAINED, f"{study}-as-trained")):
         if file == MEASUREMENTS or (path / file).is_file():
             measured = read_measurements(path / file)
             measured.compact().write(results / f"{name}.nc.xz")
     if (path / ENGINE_ERRORS).is_file():
         figure = (path / ENGINE_ERRORS).read_bytes()
-        write_bytes(root / FIGURES / f"{study}-{ENGINE_ERRORS}", figure)
+        documents.write_bytes(root / FIGURES / f"{study}-{ENGINE_ERRORS}", figure)
 
 
 def _cases(path: Path) -> dict[str, Benchmark]:
@@ -114,7 +110,7 @@ def _cases(path: Path) -> dict[str, Benchmark]:
         BadInput: the file does not contain figures by case.
     """
     try:
-        *_, last = read_file(path).splitlines()
+        *_, last = documents.read_file(path).splitlines()
         found = msgspec.json.decode(last, type=dict[str, dict[str, float | str | None]])
     except (ValueError, msgspec.MsgspecError) as error:
         raise BadInput(

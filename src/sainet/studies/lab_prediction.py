@@ -14,20 +14,9 @@ from jaxtyping import Float
 
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
+from sainet.evaluation import measurements, metrics
 from sainet.evaluation.claims import Claim, Verdict, compared, errs_less
 from sainet.evaluation.joining import add_models
-from sainet.evaluation.measurements import (
-    Condition,
-    Header,
-    Measurements,
-    measurements_of,
-)
-from sainet.evaluation.metrics import (
-    REFERENCE_DISTANCE,
-    final_pose,
-    push_errors,
-    travel_mm,
-)
 from sainet.evaluation.summary import Summary
 from sainet.models.identity import ModelId
 from sainet.report.figures.curves import FACTOR, draw_data_efficiency
@@ -56,19 +45,19 @@ _AROUND = AROUND_IDENTIFIED.identity().slug
 FLOOR = ModelId(kind="published", name="mean-of-repetitions")
 
 
-class WithFloor(Step[Measurements]):
+class WithFloor(Step[measurements.Measurements]):
     """Errors of models on repeated pushes, beside the scatter of the repetitions."""
 
     models: Evaluate
 
-    def run(self, runner: "Runner") -> Measurements:
+    def run(self, runner: "Runner") -> measurements.Measurements:
         """Return both."""
         measured = runner.result(self.models)
         floor = scatter(runner.result(self.models.pushes))
         return add_models(measured, floor.in_condition(measured.header.conditions[0]))
 
 
-def scatter(store: Store) -> Measurements:
+def scatter(store: Store) -> measurements.Measurements:
     """Return how far each repetition of a push is from the mean of all of them.
 
     Each model predicts from the measured start of a repetition. The mean is therefore
@@ -86,12 +75,14 @@ def scatter(store: Store) -> Measurements:
         count = np.maximum(observed[rows].sum(axis=0), 1)
         mean[rows] = motion[rows].sum(axis=0) / count[:, None, None]
         share[rows] = np.sqrt(rows.sum() / max(rows.sum() - 1, 1))
-    errors = push_errors(mean, motion, observed)
+    errors = metrics.push_errors(mean, motion, observed)
     initial = arrays["initial"][..., :3].astype(np.float64)
-    return measurements_of(
+    return measurements.measurements_of(
         {k: (v * share[:, None])[None, None] for k, v in errors.items()},
-        travel_mm(initial, final_pose(true, observed)),
-        Header(models=(FLOOR,), reference_m=REFERENCE_DISTANCE["recorded"]),
+        metrics.travel_mm(initial, metrics.final_pose(true, observed)),
+        measurements.Header(
+            models=(FLOOR,), reference_m=metrics.REFERENCE_DISTANCE["recorded"]
+        ),
         condition=np.zeros(len(kind), int),
         row=np.arange(len(kind)),
     )
@@ -120,7 +111,7 @@ def _plan(scope: Scope) -> Plan:
     return Plan(JoinLabs(measured, tuple(lab.number for _, lab in parts)))
 
 
-def _parts(lab: Lab) -> Iterator[Step[Measurements]]:
+def _parts(lab: Lab) -> Iterator[Step[measurements.Measurements]]:
     whole, tests = lab.trained(), lab.tests()
     every = (*shipped(), *whole.all())
     for count in lab.sizes.counts:
@@ -138,9 +129,9 @@ def _parts(lab: Lab) -> Iterator[Step[Measurements]]:
     yield Evaluate((physics()[0], *there), tests, here)
 
 
-def _of_curve(label: str, count: int) -> Condition:
+def _of_curve(label: str, count: int) -> measurements.Condition:
     """Return a condition of the learning curve, which differs in nothing else."""
-    return Condition(label=label, factors={FACTOR: count})
+    return measurements.Condition(label=label, factors={FACTOR: count})
 
 
 # Of the paper (Ajay et al., ICRA 2019), on a physical robot.

@@ -24,19 +24,9 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.robots import Surface
 from sainet.runs.errors import MissingExtra
-from sainet.studies import Scale
+from sainet.studies import Scale, steps
 from sainet.studies.paper_setup import IN, SAIN, physics, scaled
 from sainet.studies.recorded_models import IDENTIFIED, Variant
-from sainet.studies.steps import (
-    Apart,
-    Evaluate,
-    First,
-    Identify,
-    Load,
-    Rest,
-    Step,
-    Train,
-)
 from sainet.studies.study import Need, Plan, Scope, Study
 
 if TYPE_CHECKING:
@@ -78,7 +68,7 @@ def _mujoco(scope: Scope) -> None:
 MUJOCO: Need = _mujoco
 
 
-class Collect(Apart[Store]):
+class Collect(steps.Apart[Store]):
     """Pushes that the robot of a virtual lab records."""
 
     config: CollectConfig
@@ -99,10 +89,10 @@ class Collect(Apart[Store]):
             return collect(self.config, runner.folder(self), on_pushes=bar.add)
 
 
-class JoinLabs(Step[Measurements]):
+class JoinLabs(steps.Step[Measurements]):
     """Measurements in several labs, each of which may have several parts."""
 
-    parts: tuple[Step[Measurements], ...]
+    parts: tuple[steps.Step[Measurements], ...]
     labs: tuple[int, ...]  # of the parts
 
     def run(self, runner: "Runner") -> Measurements:
@@ -139,14 +129,14 @@ class Lab:
         count, repeats = self.sizes.repeated, self.sizes.repeats
         return Collect(self._config("abs", count * repeats, seed=1, repeats=repeats))
 
-    def tests(self, surface: Surface = "abs") -> Rest:
+    def tests(self, surface: Surface = "abs") -> steps.Rest:
         """Return the test pushes on a surface."""
-        return Rest(self.pushes(surface), self.sizes.training)
+        return steps.Rest(self.pushes(surface), self.sizes.training)
 
     def trained(self, count: int = 0, surface: Surface = "abs") -> "LabModels":
         """Return the models of so many training pushes on a surface; 0: of all."""
         count = count or self.sizes.training
-        pushes = First(self.pushes(surface), count)
+        pushes = steps.First(self.pushes(surface), count)
         return LabModels(pushes, count, self)
 
     def _config(
@@ -166,37 +156,39 @@ class Lab:
 class LabModels:
     """The models that are made of some training pushes of a lab."""
 
-    pushes: Step[Store]
+    pushes: steps.Step[Store]
     count: int
     lab: Lab
 
     @property
-    def identified(self) -> Identify:
+    def identified(self) -> steps.Identify:
         """Physics with parameters identified on the pushes."""
-        return Identify(ModelId(kind="physics", simulator=IDENTIFIED), self.pushes)
+        return steps.Identify(
+            ModelId(kind="physics", simulator=IDENTIFIED), self.pushes
+        )
 
-    def tuned(self, variant: Variant) -> Train:
+    def tuned(self, variant: Variant) -> steps.Train:
         """Return a shipped network after fine-tuning on the pushes."""
         recipe = FINE_TUNING.changed(
             start=FromModel(variant.network), seed=self.lab.number
         )
         is_nominal = variant.engine == "nominal"
-        return Train(
+        return steps.Train(
             variant.identity(),
             self.pushes,
             scaled(recipe, self.lab.scale, self.count),
             None if is_nominal else self.identified,
         )
 
-    def all(self) -> tuple[Step[Model], ...]:
+    def all(self) -> tuple[steps.Step[Model], ...]:
         """Return every model that the pushes were used for."""
         tuned = (self.tuned(variant) for variant in (*TUNED, AROUND_IDENTIFIED))
         return self.identified, *tuned
 
 
-def shipped() -> tuple[Step[Model], ...]:
+def shipped() -> tuple[steps.Step[Model], ...]:
     """Return what needs no pushes of a lab: physics, and networks of simulation."""
-    return *physics(), Load(IN, "in"), Load(SAIN, "sain")
+    return *physics(), steps.Load(IN, "in"), steps.Load(SAIN, "sain")
 
 
 def labs(scale: Scale) -> Iterator[Lab]:
@@ -208,7 +200,7 @@ def _plan(scope: Scope) -> Plan:
     """Return the errors of physics on the test pushes of every lab and surface."""
     cases = list(product(labs(scope.scale), SURFACES))
     parts = tuple(
-        Evaluate(physics(), lab.tests(surface), condition_of(surface))
+        steps.Evaluate(physics(), lab.tests(surface), condition_of(surface))
         for lab, surface in cases
     )
     return Plan(JoinLabs(parts, tuple(lab.number for lab, _ in cases)))

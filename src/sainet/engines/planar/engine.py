@@ -6,15 +6,7 @@ from jax import lax
 from jaxtyping import Array, Float
 
 from sainet.engines.base import AbstractEngine
-from sainet.engines.planar import solver
-from sainet.engines.planar.contact import (
-    Bodies,
-    Properties,
-    Twist,
-    to_bodies,
-    to_properties,
-    to_state,
-)
+from sainet.engines.planar import contact, solver
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -39,12 +31,14 @@ class PlanarEngine(AbstractEngine):
         """Return the states after each step of the controls."""
         properties = self._properties(scene, controls)
 
-        def advance(bodies: Bodies, control: Array) -> tuple[Bodies, State]:
+        def advance(
+            bodies: contact.Bodies, control: Array
+        ) -> tuple[contact.Bodies, State]:
             moved = self._step(scene, properties, bodies, controls, control)
-            return moved, to_state(moved)
+            return moved, contact.to_state(moved)
 
         command = jnp.moveaxis(controls.command, -2, 0)
-        _, states = lax.scan(advance, to_bodies(initial), command)
+        _, states = lax.scan(advance, contact.to_bodies(initial), command)
         return Trajectory(_time_after_batch(states, len(scene.batch_shape)))
 
     def step(
@@ -63,21 +57,23 @@ class PlanarEngine(AbstractEngine):
             control: one step of `controls.command`.
         """
         properties = self._properties(scene, controls)
-        bodies = to_bodies(state)
-        return to_state(self._step(scene, properties, bodies, controls, control))
+        bodies = contact.to_bodies(state)
+        return contact.to_state(
+            self._step(scene, properties, bodies, controls, control)
+        )
 
-    def _properties(self, scene: Scene, controls: Controls) -> Properties:
+    def _properties(self, scene: Scene, controls: Controls) -> contact.Properties:
         inverse_mass = 1 / controls.pusher.mass
-        return to_properties(scene, self.pressure_radius_ratio, inverse_mass)
+        return contact.to_properties(scene, self.pressure_radius_ratio, inverse_mass)
 
     def _step(
         self,
         scene: Scene,
-        properties: Properties,
-        bodies: Bodies,
+        properties: contact.Properties,
+        bodies: contact.Bodies,
         controls: Controls,
         control: Float[Array, "*batch 2"],
-    ) -> Bodies:
+    ) -> contact.Bodies:
         bodies = _drive(bodies, controls, control, scene.time_step)
         limits = _table_limits(scene, properties, bodies)
         step = solver.Step(scene.time_step, self.recovery, self.sweeps)
@@ -90,8 +86,8 @@ class PlanarEngine(AbstractEngine):
 
 
 def _drive(
-    bodies: Bodies, controls: Controls, control: Array, time_step: float
-) -> Bodies:
+    bodies: contact.Bodies, controls: Controls, control: Array, time_step: float
+) -> contact.Bodies:
     """Return the bodies with the pusher's velocity before contact."""
     vx, vy = controls.drive(
         (bodies.x[-1], bodies.y[-1]),
@@ -106,7 +102,7 @@ def _drive(
 
 
 def _table_limits(
-    scene: Scene, properties: Properties, bodies: Bodies
+    scene: Scene, properties: contact.Properties, bodies: contact.Bodies
 ) -> tuple[Array, ...]:
     """Return the largest impulse of table friction on each disk (N s)."""
     impulse = properties.table_friction * scene.time_step
@@ -118,9 +114,11 @@ def _table_limits(
     return tuple(limit * field.at(x, y) for limit, x, y in places)
 
 
-def _integrate(bodies: Bodies, twists: tuple[Twist, ...], time_step: float) -> Bodies:
+def _integrate(
+    bodies: contact.Bodies, twists: tuple[contact.Twist, ...], time_step: float
+) -> contact.Bodies:
     vx, vy, spin = zip(*twists, strict=True)
-    return Bodies(
+    return contact.Bodies(
         x=tuple(p + time_step * v for p, v in zip(bodies.x, vx, strict=True)),
         y=tuple(p + time_step * v for p, v in zip(bodies.y, vy, strict=True)),
         angle=tuple(a + time_step * w for a, w in zip(bodies.angle, spin, strict=True)),

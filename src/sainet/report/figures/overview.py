@@ -16,13 +16,7 @@ from matplotlib.ticker import (
 
 from sainet.evaluation.claims import our_model
 from sainet.evaluation.summary import BASELINE, Summary
-from sainet.report.figures.canvas import (
-    LineLook,
-    add_grid,
-    house_look,
-    new_figure,
-    save,
-)
+from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
 
 _METRIC = "pos_mm"
@@ -65,8 +59,8 @@ def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
         path: where to write; ``.svg`` or ``.png``.
     """
     sections = [Section(part.title, [*_ratios(part)]) for part in parts]
-    with house_look():
-        figure = new_figure(7.6, _height(sections))
+    with canvas.house_look():
+        figure = canvas.new_figure(7.6, _height(sections))
         axes = figure.subplots()
         axes.set_xscale("log")
         axes.xaxis.set_major_locator(FixedLocator(_SHARES))
@@ -75,7 +69,7 @@ def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
         axes.axvline(1, color=INK, linewidth=0.8)
         axes.set_xlabel("position error over that of physics")
         _draw(axes, sections)
-        return save(figure, path)
+        return canvas.save(figure, path)
 
 
 def draw_success(parts: Sequence[Part], path: Path) -> Path:
@@ -86,14 +80,14 @@ def draw_success(parts: Sequence[Part], path: Path) -> Path:
         path: where to write; ``.svg`` or ``.png``.
     """
     sections = [Section(part.title, [*_successes(part)]) for part in parts]
-    with house_look():
-        figure = new_figure(7.6, _height(sections))
+    with canvas.house_look():
+        figure = canvas.new_figure(7.6, _height(sections))
         axes = figure.subplots()
         axes.set_xlim(0, 1.02)
         axes.xaxis.set_major_formatter(PercentFormatter(1))
         axes.set_xlabel("goals solved")
         _draw(axes, sections)
-        return save(figure, path)
+        return canvas.save(figure, path)
 
 
 def _ratios(part: Part) -> Iterator[Dot]:
@@ -153,16 +147,16 @@ def _draw(axes: Axes, sections: Sequence[Section]) -> None:
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(place - 0.9, -0.8)
     axes.spines["left"].set_visible(False)
-    add_grid(axes, "x")
+    canvas.add_grid(axes, "x")
     if any(dot.published is not None for section in sections for dot in section.dots):
         mark = Line2D([], [], label="published", **_published(INK))
         axes.legend(handles=[mark], loc="lower right")
 
 
-def _published(color: str) -> LineLook:
+def _published(color: str) -> canvas.LineLook:
     """Return the look of a published number: a hollow diamond."""
-    look = LineLook(color=color, linewidth=0, marker="D", markersize=5.5)
-    return look | LineLook(markerfacecolor="none")
+    look = canvas.LineLook(color=color, linewidth=0, marker="D", markersize=5.5)
+    return look | canvas.LineLook(markerfacecolor="none")
 
 
 def _draw_dot(axes: Axes, dot: Dot, place: float) -> None:
