@@ -4,8 +4,6 @@ The ground truth is Bullet without noise; all engines have the true properties. 
 is not isotropic: its difference from itself is the best possible result.
 """
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 import numpy as np
 
@@ -21,12 +19,10 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
+from sainet.studies.runner import Runner
 from sainet.studies.steps import Evaluate, Join, Simulate, Step
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import SetupName
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
 
 PUSHES = 200
 _SETUPS: tuple[SetupName, ...] = ("robot", "direct-force")
@@ -79,7 +75,7 @@ class TrueEngine(Step[Model]):
             return f"bullet-at-{self.turned_deg}-deg"
         return f"planar-{self.pressure_radius_ratio:.2f}"
 
-    def run(self, runner: "Runner") -> Model:
+    def run(self, runner: Runner) -> Model:
         """Return the model."""
         if self.pressure_radius_ratio is None:
             angle = np.deg2rad(self.turned_deg)

@@ -1,7 +1,6 @@
 """Settings of fine-tuning on few pushes, compared on surrogate robots."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +11,9 @@ from sainet.evaluation.summary import Summary
 from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import physics, scaled
+from sainet.studies.runner import Runner
 from sainet.studies.steps import Evaluate, First, Join, Simulate, Step, Train
 from sainet.studies.study import Change, Choice, Plan, Scope, Study
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
 
 
 @dataclass(frozen=True)
@@ -68,7 +65,7 @@ class Record(Step[Store]):
         """The pushes and the robot."""
         return f"{self.pushes.name}-{self.robot.name}"
 
-    def run(self, runner: "Runner") -> Store:
+    def run(self, runner: Runner) -> Store:
         """Return the dataset, made where that is unfinished."""
         made = runner.result(self.pushes)
         return record(self.robot, made, runner.folder(self), is_test=self.is_test)

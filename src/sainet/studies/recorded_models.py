@@ -1,7 +1,7 @@
 """The models that are compared on recorded pushes, and how each is made."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Int
@@ -19,10 +19,8 @@ from sainet.models.model import Model
 from sainet.models.wrappers import with_camera
 from sainet.studies import Scale
 from sainet.studies.paper_setup import physics, scaled
+from sainet.studies.runner import Runner
 from sainet.studies.steps import Given, Identify, Load, Step, Train
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
 
 Inside = Literal["nominal", "identified"]  # the engine in SAIN
 Learned = Literal["simulation", "tuned", "residual", "real"]
@@ -73,7 +71,7 @@ class AroundIdentified(Step[Model]):
     network: str
     identified: Identify
 
-    def run(self, runner: "Runner") -> Model:
+    def run(self, runner: Runner) -> Model:
         """Return the model."""
         network = load_network(network_folder(self.network))[0]
         internal = read_identified(runner.folder(self.identified)).engine

@@ -9,7 +9,6 @@ surfaces stand beside them.
 from collections.abc import Iterator
 from dataclasses import field
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,11 +27,9 @@ from sainet.studies.recorded_models import (
     Variant,
     surfaces_of,
 )
+from sainet.studies.runner import Runner
 from sainet.studies.steps import Evaluate, Given, Join, Step
 from sainet.studies.study import RECORDED, Plan, Scope, Study
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
 
 FOLDS = {"quick": 2, "paper": 5}
 NETWORKS: tuple[tuple[ModelKind, Inside], ...] = (
@@ -75,7 +72,7 @@ class JoinFolds(Step[Measurements]):
     folds: tuple[Fold, ...] = field(repr=False)  # of the parts, which identify them
     condition: Condition | None = None
 
-    def run(self, runner: "Runner") -> Measurements:
+    def run(self, runner: Runner) -> Measurements:
         """Return the measurements in one condition, if one is given."""
         measured = map(runner.result, self.parts)
         found = join_folds([*zip(self.folds, measured, strict=True)])
@@ -89,7 +86,7 @@ class BySurface(Step[Measurements]):
     for_all: JoinFolds  # by models of all surfaces
     pushes: Given
 
-    def run(self, runner: "Runner") -> Measurements:
+    def run(self, runner: Runner) -> Measurements:
         """Return the measurements of both kinds of models."""
         for_all = without_predictions(runner.result(self.for_all))
         whole = add_models(runner.result(self.own), for_all)
@@ -109,7 +106,7 @@ class EndErrors(Step[EndOffsets]):
     model: Step[Model]
     pushes: Step[Store]
 
-    def run(self, runner: "Runner") -> EndOffsets:
+    def run(self, runner: Runner) -> EndOffsets:
         """Return the errors."""
         return end_offsets(runner.result(self.model), runner.result(self.pushes))
 

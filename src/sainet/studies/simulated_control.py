@@ -8,7 +8,6 @@ shipped ones.
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from sainet.control.config import ControlConfig
 from sainet.control.record import EpisodeRecord
@@ -18,11 +17,9 @@ from sainet.evaluation.measurements import Condition, Measurements, PublishedVal
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.studies.paper_setup import IN, SAIN, physics
+from sainet.studies.runner import Bar, Runner
 from sainet.studies.steps import Join, Load, Step, Train
 from sainet.studies.study import Plan, Scope, Study
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Bar, Runner
 
 TRIALS = {"quick": 4, "paper": 100}
 MODELS = (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
@@ -43,7 +40,7 @@ class RunTrials(Step[Measurements]):
         """The condition."""
         return self.condition.label
 
-    def run(self, runner: "Runner") -> Measurements:
+    def run(self, runner: Runner) -> Measurements:
         """Return the outcomes; finished episodes are kept."""
         records = {}
         for step in self.models:
@@ -62,7 +59,7 @@ class RunTrials(Step[Measurements]):
         return measure_trials(records, self.condition)
 
 
-def _count(bar: "Bar", solved: list[bool], record: EpisodeRecord) -> None:
+def _count(bar: Bar, solved: list[bool], record: EpisodeRecord) -> None:
     solved.append(record.solved)
     bar.add(1, f"{sum(solved)} solved")
 

@@ -2,16 +2,13 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 
+from sainet.evaluation.evaluate import EndOffsets
 from sainet.report.figures.canvas import add_grid, house_look, new_figure, save
 from sainet.report.palette import INK, MOVED, PUSHED
-
-if TYPE_CHECKING:
-    from sainet.evaluation.evaluate import EndOffsets
 
 _CELL = 20.0  # mm, of the table
 _FEWEST = 4  # pushes of a mean that is drawn
@@ -20,7 +17,7 @@ _SECTORS = 12  # of headings
 _SHOWN = 2.0  # mm, length of the scale arrow
 
 
-def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
+def draw_engine_errors(cases: Mapping[str, EndOffsets], path: Path) -> Path:
     """Draw the final errors of engines, with one row per surface and engine.
 
     Left: the mean vector from the predicted to the recorded final position, by the
@@ -49,7 +46,7 @@ def draw_engine_errors(cases: Mapping[str, "EndOffsets"], path: Path) -> Path:
         return save(figure, path)
 
 
-def _draw_table(axes: Axes, case: "EndOffsets") -> None:
+def _draw_table(axes: Axes, case: EndOffsets) -> None:
     place, offset = 1000 * case.place, 1000 * case.offset
     axes.plot(*place.T, ".", color=INK, alpha=0.25, markersize=2)
     cells, owner = np.unique(np.floor(place / _CELL), axis=0, return_inverse=True)
@@ -72,7 +69,7 @@ def _draw_table(axes: Axes, case: "EndOffsets") -> None:
     axes.set_ylabel("y of the disk (mm)")
 
 
-def _draw_directions(axes: Axes, case: "EndOffsets") -> None:
+def _draw_directions(axes: Axes, case: EndOffsets) -> None:
     heading = np.rad2deg(case.heading)
     sector = np.floor((heading + 180) / (360 / _SECTORS)).astype(int) % _SECTORS
     lines = {
