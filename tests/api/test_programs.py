@@ -1,5 +1,10 @@
 """The short programs of the documentation run as they are shown."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 from sainet.learning import recipes
@@ -53,3 +58,18 @@ def test_own_data(folder, monkeypatch, few_iterations, capsys):
     # Nothing else was left behind.
     assert {path.name for path in folder.iterdir()} == {"runs", "report.html"}
     assert [path.name for path in (folder / "runs").iterdir()] == ["recorded"]
+
+
+def test_compiled_programs_are_kept_for_the_next_script(tmp_path):
+    names = ("JAX_COMPILATION_CACHE_DIR", "JAX_ENABLE_COMPILATION_CACHE")
+    environment = {k: v for k, v in os.environ.items() if k not in names}
+    environment |= {"XDG_CACHE_HOME": str(tmp_path)}
+    code = f"{PREDICT}\nimport jax; print(jax.config.jax_compilation_cache_dir)"
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""  # no progress, no warning
+    folder = Path(done.stdout.strip())
+    assert folder.parent == tmp_path / "sainet"

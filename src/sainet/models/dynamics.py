@@ -221,24 +221,19 @@ def predict(
         controls: of each push.
         simulated: stored simulator prediction, see `AbstractDynamics.advance`.
     """
-    push = (scene, initial, controls, simulated)
-    if scene.batch_shape:
-        return _predict(dynamics, push)
-    batch = jax.tree.map(lambda x: x[None], push)
-    return jax.tree.map(lambda x: x[0], _predict(dynamics, batch))
+    is_compiled = simulated is not None or not dynamics.on_host
+    roll = _compiled if is_compiled else _roll
+    return roll(dynamics, (scene, initial, controls, simulated))
 
 
 _Push = tuple[Scene, State, Controls, Trajectory | None]
 
 
-def _predict(dynamics: AbstractDynamics, push: _Push) -> Trajectory:
-    if dynamics.on_host and push[-1] is None:
-        return _roll(dynamics, push)
-    return _compiled(dynamics, push)
-
-
 def _roll(dynamics: AbstractDynamics, push: _Push) -> Trajectory:
     scene, initial, controls, simulated = push
+    if not scene.batch_shape:
+        batch = jax.tree.map(lambda x: x[None], push)
+        return jax.tree.map(lambda x: x[0], _roll(dynamics, batch))
     carry = dynamics.begin(scene, initial)
     return dynamics.advance(scene, carry, controls, simulated)[1]
 

@@ -16,7 +16,14 @@ from sainet.models.dynamics import (
     predict,
 )
 from sainet.models.identity import ModelId
-from sainet.models.push_inputs import commanded, is_traced, steps_of
+from sainet.models.push_inputs import (
+    check_axes,
+    compiled,
+    is_traced,
+    kind_of,
+    predict_push,
+    steps_of,
+)
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
 from sainet.scenes.controls import Controls
@@ -100,11 +107,13 @@ class Model:
                 f"{self.name} does not run in JAX, which cannot trace it; give a batch "
                 "of pushes."
             )
-        if isinstance(push, Push):
-            steps = steps_of(push, scene.time_step) if steps is None else steps
-            scene, state, push = commanded(scene, state, push, steps)
-        check_purpose(self.dynamics, push.kind, scene.time_step)
-        return predict(self.dynamics, scene, state, push)
+        check_purpose(self.dynamics, kind_of(push), scene.time_step)
+        if not isinstance(push, Push):
+            return predict(self.dynamics, scene, state, push)
+        steps = steps_of(push, scene.time_step) if steps is None else steps
+        check_axes(scene, state, push)
+        run = predict_push if self.dynamics.on_host else compiled
+        return run(self.dynamics, scene, state, push, steps)
 
     def check_fits(
         self,

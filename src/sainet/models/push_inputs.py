@@ -1,4 +1,4 @@
-"""Pushes as inputs of models: their steps, equal leading axes, and their commands."""
+"""Pushes as inputs of models: steps, equal leading axes, commands and predictions."""
 
 from typing import Any
 
@@ -8,12 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from sainet.models.dynamics import AbstractDynamics, predict
 from sainet.runs.errors import BadScene
-from sainet.scenes.controls import PathControls
+from sainet.scenes.controls import Controls, PathControls
 from sainet.scenes.pushes import Push, command_path
 from sainet.scenes.quantities import CONTACT_ANGLE, DIRECTION, SPEED, STROKE
 from sainet.scenes.scene import TIME_STEP, Scene
-from sainet.scenes.state import State
+from sainet.scenes.state import State, Trajectory
 from sainet.worlds.setups import RobotSetup
 
 _USUAL_STEPS = 200  # of a push whose length or speed is traced
@@ -45,40 +46,40 @@ def steps_of(push: Push, time_step: float) -> int:
     return int(np.ceil(steps * TIME_STEP / time_step - 1e-6))
 
 
-def _together(scene: Scene, state: State, push: Push) -> tuple[Scene, State, Push]:
-    """Return the parts with equal leading axes."""
-    parts = (scene, state, push)
-    own = scene.batch_shape, state.angle.shape[:-1], push.speed.shape
+def kind_of(push: Push | Controls) -> str:
+    """Return the setup that a push or controls are for."""
+    return PathControls.kind if isinstance(push, Push) else push.kind
+
+
+def check_axes(scene: Scene, state: State, push: Push) -> None:
+    """Raise `BadScene` unless the leading axes can be broadcast."""
     try:
-        shape = np.broadcast_shapes(*own)
+        np.broadcast_shapes(*_axes(scene, state, push))
     except ValueError:
-        names = ", ".join(map(str, own))
+        names = ", ".join(map(str, _axes(scene, state, push)))
         raise BadScene(
             f"push: the leading axes of scene, state and push are {names}; give equal "
             "ones, or none."
         ) from None
 
+
+def _axes(scene: Scene, state: State, push: Push) -> tuple[tuple[int, ...], ...]:
+    return scene.batch_shape, state.angle.shape[:-1], push.speed.shape
+
+
+def predict_push(
+    dynamics: AbstractDynamics, scene: Scene, state: State, push: Push, steps: int
+) -> Trajectory:
+    """Return the predicted motion of pushes, with the leading axes of all parts."""
+    own = _axes(scene, state, push)
+    shape = np.broadcast_shapes(*own)
+
     def widened(part: Any, axes: int) -> Any:  # noqa: ANN401
         return jax.tree.map(lambda x: jnp.broadcast_to(x, shape + x.shape[axes:]), part)
 
-    found = (widened(*pair) for pair in zip(parts, map(len, own), strict=True))
-    return tuple(found)
+    parts = zip((scene, state, push), map(len, own), strict=True)
+    scene, state, push = (widened(*part) for part in parts)
+    return predict(dynamics, scene, *command_path(scene, state, push, steps=steps))
 
 
-def commanded(
-    scene: Scene, state: State, push: Push, steps: int
-) -> tuple[Scene, State, PathControls]:
-    """Return scene, start and controls of pushes, all with equal leading axes.
-
-    Raises:
-        BadScene: the leading axes differ.
-    """
-    scene, state, push = _together(scene, state, push)
-    return scene, *_command(scene, state, push, steps)
-
-
-@eqx.filter_jit
-def _command(
-    scene: Scene, state: State, push: Push, steps: int
-) -> tuple[State, PathControls]:
-    return command_path(scene, state, push, steps=steps)
+compiled = eqx.filter_jit(predict_push)

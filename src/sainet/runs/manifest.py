@@ -9,6 +9,8 @@ from pathlib import Path
 
 import msgspec
 
+from sainet.runs.documents import content_hash
+
 MANIFEST = "manifest.json"
 _PACKAGES = (
     *("sainet", "jax", "jaxlib", "equinox", "optax", "numpy", "scipy", "zarr"),
@@ -76,3 +78,17 @@ def processor() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor()
+
+
+WORTH_KEEPING = 0.5  # s of compilation
+
+
+def cache_folder() -> Path:
+    """Return where compiled code is kept: ``$XDG_CACHE_HOME/sainet`` or ~/.cache.
+
+    A folder for each processor: code that was compiled for one may not run on another
+    that shares the home folder.
+    """
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    machine = f"{processor()} {platform.machine()}"
+    return Path(home) / "sainet" / content_hash(machine.encode())[:12]
