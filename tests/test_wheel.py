@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from api.programs import PREDICT
 from support import REPOSITORY, SOURCE, require
 
 pytestmark = pytest.mark.slow
@@ -24,6 +25,9 @@ for module in pkgutil.walk_packages(sainet.__path__, "sainet."):
         importlib.import_module(module.name)
 print(sainet.__file__)
 """
+
+
+SHOWN = f"{PREDICT}\nprint(trajectory.final.position)"
 
 
 def run(*command: object, **settings: object) -> subprocess.CompletedProcess[str]:
@@ -126,6 +130,8 @@ def test_the_wheel_works_in_an_empty_environment(
     assert project_version in run_well(command, "--version", cwd=tmp_path)
     assert "demo" in run_well(command, "--help", cwd=tmp_path)
     origin = run_well(venv / "bin" / "python", "-c", IMPORT_ALL, cwd=tmp_path).strip()
+    shown = run_well(venv / "bin" / "python", "-c", SHOWN, cwd=tmp_path)
+    assert shown.startswith("[[0.01"), shown  # m: disk 1 moved with the pusher
     package = Path(origin).parent
     assert package.is_relative_to(venv)
     assert package.parent.name == "site-packages"

@@ -25,6 +25,8 @@ from sainet.engines.base import (
 )
 from sainet.engines.planar.engine import PlanarEngine as PlanarEngine
 from sainet.learning.fit import fit as fit
+from sainet.learning.recipes import FromModel as FromModel
+from sainet.learning.recipes import FromSimulator as FromSimulator
 from sainet.learning.recipes import Recipe as Recipe
 from sainet.learning.recipes import recipe_for as recipe_for
 from sainet.models.correctors.interaction import (

@@ -84,7 +84,9 @@ def tune(
         start: `engine` starts as the internal engine, with a network that adds nothing
             to its motion at first; otherwise a network to train further: shipped, its
             folder, or a model with a folder.
-        recipe: settings of training; None: those that fit the start.
+        recipe: settings of training, for example
+            ``recipe_for(FromSimulator()).changed(l2=0.01)``; with a start of its own.
+            None: the recipe that fits `start`.
         iterations: gradient steps; None: those of the recipe.
         seed: of everything random; None: that of the recipe.
         out: run folder, with the network and the log of its training; an identical
