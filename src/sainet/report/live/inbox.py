@@ -1,6 +1,7 @@
 """Messages that wait for their answer; of pointer messages only the newest."""
 
 import asyncio
+import math
 import time
 from collections import deque
 from collections.abc import Callable, Hashable
@@ -76,11 +77,12 @@ class Allowance:
 
     clock: Callable[[], float] = time.monotonic
     left: float = _BURST
-    is_news: bool = False  # the last refusal is the first for a second
+    is_news: bool = False  # whether the last refusal is the first for a second
 
     def __post_init__(self) -> None:
         """Start the clock."""
-        self._since = self._refused = self.clock()
+        self._since = self.clock()
+        self._said = -math.inf  # time of the last news
 
     def take(self) -> bool:
         """Whether one more message is allowed; it is counted if so."""
@@ -90,6 +92,6 @@ class Allowance:
         if self.left >= 1:
             self.left -= 1
             return True
-        self.is_news = now - self._refused > _QUIET
-        self._refused = now if self.is_news else self._refused
+        self.is_news = now - self._said > _QUIET
+        self._said = now if self.is_news else self._said
         return False

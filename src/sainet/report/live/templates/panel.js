@@ -36,7 +36,6 @@ export class Sliders {
       this.set(`radius-${index + 1}`, disk.radius_mm, LIMITS.radius);
     });
     this.set("table-friction", view.table_friction, LIMITS.friction);
-    this.root.disabled = !view.has_own_properties;
     byId("hidden-properties").hidden = view.has_own_properties;
   }
 
@@ -101,8 +100,8 @@ export class Readout {
     if (this.disks !== disks) this.makeHead(disks);
     const label = this.models.find(({ name }) => name === ghosts.against)?.label;
     byId("readout-title").textContent = ghosts.against === "world"
-      ? "Errors: predictions against the executed push"
-      : `Differences from ${label}, for the push under the pointer`;
+      ? "Errors of the predictions, for the executed push"
+      : `Differences from ${label}, for this push`;
     ghosts.ghosts.forEach((ghost) => {
       const { id } = this.models.find(({ name }) => name === ghost.model);
       const row = byId(`row-${id}`);

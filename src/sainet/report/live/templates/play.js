@@ -82,8 +82,8 @@ class Play {
     this.sliders.show(view);
     ["world", "noise", "model"].forEach((name) => choose(name, view[name]));
     choose("disks", view.disks.length);
-    document.querySelectorAll('input[name="disks"]').forEach((input) => {
-      input.disabled = view.world === "lab" && input.value !== "2";
+    document.querySelectorAll('input[name="disks"], input[name="noise"]').forEach((input) => {
+      input.disabled = view.world === "lab" && !input.checked;
     });
     this.table.hidePlan();
     this.describe();
@@ -166,7 +166,6 @@ class Play {
     this.isBusy = false;
     this.setContinuing(false);
     this.notify(text, isError);
-    this.enable();
   }
 
   notify(text, isError) {
@@ -224,6 +223,7 @@ class Play {
     this.isContinuing = isContinuing;
     byId("continue").textContent = isContinuing ? "Stop" : "Continue to the goal";
     byId("continue").setAttribute("aria-pressed", String(isContinuing));
+    this.enable();
   }
 
   get canPush() {
@@ -238,6 +238,7 @@ class Play {
     byId("restart").disabled = !isFree || this.isContinuing;
     byId("save").disabled = !isFree || this.isContinuing || this.view.episodes === 0;
     ["world-choices", "model-choices"].forEach((id) => { byId(id).disabled = !isFree || this.isContinuing; });
+    byId("properties").disabled = !isFree || this.isContinuing || !this.view.has_own_properties;
   }
 
   listen() {
@@ -245,7 +246,6 @@ class Play {
     byId("plan").addEventListener("click", () => this.plan());
     byId("continue").addEventListener("click", () => {
       this.setContinuing(!this.isContinuing);
-      this.enable();
       if (this.isContinuing) this.plan();
     });
     byId("restart").addEventListener("click", () => this.change("restart"));
