@@ -24,8 +24,7 @@ export function chosen(name) {
 }
 
 export class Sliders {
-  constructor(root, onChange) {
-    this.root = root;
+  constructor(onChange) {
     this.onChange = onChange;
   }
 

@@ -15,13 +15,14 @@ class Play {
     this.models = JSON.parse(byId("models").textContent);
     this.table = new Table(byId("table"), this.models);
     this.readout = new Readout(this.models);
-    this.sliders = new Sliders(byId("properties"), (values) => this.send("properties", values));
+    this.sliders = new Sliders((values) => this.change("properties", values));
     this.aim = { contact: 0, direction: 0 };
     this.number = 0;
     this.waiting = null; // the aim that the server works on
     this.next = null; // time of the newest pointer event that has no answer
     this.latencies = [];
     this.isBusy = false; // a push is planned or executed
+    this.isChanging = false; // another world or model is on its way
     this.isContinuing = false;
     this.status = { is_ready: false, can_predict: false };
     this.listen();
@@ -34,7 +35,7 @@ class Play {
     this.socket = new WebSocket(`ws://${window.location.host}/live`);
     this.socket.addEventListener("message", (event) => this.receive(JSON.parse(event.data)));
     this.socket.addEventListener("open", () => {
-      Object.assign(this, { waiting: null, next: null, isBusy: false });
+      Object.assign(this, { waiting: null, next: null, isBusy: false, isChanging: false });
     });
     this.socket.addEventListener("close", (event) => this.lose(event.code));
   }
@@ -78,6 +79,7 @@ class Play {
     if (held === "goal") view.goal_mm = this.view.goal_mm;
     else if (view.disks[held]) view.disks[held].pose = this.view.disks[held].pose;
     this.view = view;
+    this.isChanging = false;
     this.table.show(view);
     this.sliders.show(view);
     ["world", "noise", "model"].forEach((name) => choose(name, view[name]));
@@ -163,7 +165,7 @@ class Play {
   }
 
   fail({ text, is_error: isError }) {
-    this.isBusy = false;
+    Object.assign(this, { isBusy: false, isChanging: false });
     this.setContinuing(false);
     this.notify(text, isError);
   }
@@ -208,7 +210,7 @@ class Play {
   }
 
   plan() {
-    if (this.isBusy || !this.status.is_ready) return;
+    if (!this.isFree) return;
     this.begin();
     this.send("plan");
   }
@@ -226,12 +228,16 @@ class Play {
     this.enable();
   }
 
+  get isFree() {
+    return this.status.is_ready && !this.isBusy && !this.isChanging && Boolean(this.view);
+  }
+
   get canPush() {
-    return !this.isBusy && !this.isBlocked && this.status.is_ready && Boolean(this.view);
+    return this.isFree && !this.isBlocked;
   }
 
   enable() {
-    const isFree = this.status.is_ready && !this.isBusy && Boolean(this.view);
+    const { isFree } = this;
     byId("push").disabled = !this.canPush;
     byId("plan").disabled = !isFree || this.isContinuing;
     byId("continue").disabled = !(this.isContinuing || (isFree && !this.view.is_solved));
@@ -261,7 +267,8 @@ class Play {
 
   change(type, values) {
     this.notify("", false);
-    this.isHolding = false;
+    Object.assign(this, { isHolding: false, isChanging: true });
+    this.enable();
     this.send(type, values);
   }
 
