@@ -19,6 +19,7 @@ from sainet.cli.evaluate import Evaluate
 from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
 from sainet.cli.output import finish
+from sainet.cli.play import Play
 from sainet.cli.record import Record
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
@@ -29,6 +30,7 @@ from sainet.runs.interrupts import remembered_interrupts
 
 _COMMANDS = {
     "demo": Demo,
+    "play": Play,
     "generate": Generate,
     "record": Record,
     "import": Import,

@@ -142,7 +142,7 @@ def record(
         solved=bool(task.is_solved(robot.scene, robot.truth)),
         final_mm=_known(1000 * float(task.distance(robot.truth))),
         pushes=len(episode.steps),
-        final=_poses(poses_of(robot.truth)),
+        final=listed_poses(poses_of(robot.truth)),
         decision_s=[step.seconds for step in episode.steps],
         goal_mm=_mm(task.goal),
         moved=task.moved,
@@ -150,7 +150,7 @@ def record(
         pusher_radius_mm=1000 * float(robot.scene.pusher_radius),
         tolerance_mm=1000 * task.tolerance * float(robot.scene.radius[task.moved]),
         table_friction=float(robot.scene.table_friction),
-        steps=[_step(trial, step) for step in episode.steps],
+        steps=[record_step(trial, step) for step in episode.steps],
     )
 
 
@@ -192,7 +192,8 @@ def episode_files(out: Path) -> list[Path]:
     return files
 
 
-def _step(trial: Trial, step: ControlStep) -> StepRecord:
+def record_step(trial: Trial, step: ControlStep) -> StepRecord:
+    """Return the record of one control step."""
     recording, plan = step.recording, step.plan
     pose, pusher = _drawn(recording)
     push = recording.commanded or plan.pushes[0]
@@ -201,15 +202,15 @@ def _step(trial: Trial, step: ControlStep) -> StepRecord:
         direction_deg=_degrees(push.direction),
         length_mm=_known(1000 * float(push.length)),
         speed_mm_s=_known(1000 * float(push.speed)),
-        observed=_poses(poses_of(step.observed)),
+        observed=listed_poses(poses_of(step.observed)),
         distance_mm=_known(1000 * float(trial.task.distance(step.observed))),
         planned_pushes=len(plan.pushes),
-        planned=_poses(plan.path[_EVERY - 1 :: _EVERY]),
+        planned=listed_poses(plan.path[_EVERY - 1 :: _EVERY]),
         planned_distance_mm=_known(1000 * plan.distance),
         looked_at=plan.looked_at,
         is_complete=plan.is_complete,
         warnings=list(plan.warnings),
-        actual=_poses(pose),
+        actual=listed_poses(pose),
         pusher=_mm(pusher),
         trouble=recording.trouble or None,
     )
@@ -237,7 +238,7 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _poses(pose: np.ndarray) -> list[Any]:
+def listed_poses(pose: Float[np.ndarray, "*shape 3"]) -> list[Any]:
     """Return x and y in mm and the angle in degrees, rounded to 0.01."""
     return _rounded(pose, np.array([1000, 1000, np.rad2deg(1)]))
 

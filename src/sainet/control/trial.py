@@ -36,7 +36,12 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
         side = config.area_mm / 1000
         robot.arrange(scattered(rng, np.asarray(true.radius), side))
         robot.observe()
-    state = robot.truth
+    return with_goal(config, index, robot)
+
+
+def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
+    """Return the trial of a robot, with the goal drawn from where its disks are."""
+    true, state = robot.scene, robot.truth
     moved = config.disks - 1
     goal = draw_goal(
         config.goals,

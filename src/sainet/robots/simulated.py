@@ -108,6 +108,23 @@ def simulated_robot(config: RobotConfig, *seed: int) -> SimulatedRobot:
     rng = _generator(*seed)
     friction = float(rng.uniform(*bounds(WorldConfig.table_friction)))
     scene = scene_of(MASS, RADIUS, config.disks, friction)
+    return _robot(config, scene, rng)
+
+
+def robot_among(config: RobotConfig, scene: Scene, *seed: int) -> SimulatedRobot:
+    """Return a robot among disks with these true properties, in a row.
+
+    Args:
+        config: world and noise.
+        scene: one scene; its table friction is not drawn.
+        seed: numbers from which the noise is drawn.
+    """
+    return _robot(config, scene, _generator(*seed))
+
+
+def _robot(
+    config: RobotConfig, scene: Scene, rng: np.random.Generator
+) -> SimulatedRobot:
     noise = at_level(NoiseConfig(), config.noise_level)
     engine = make_engine(config.world)
     world = SimulatedWorld(engine, RobotSetup(), noise, rng, np.float32)

@@ -1,0 +1,1 @@
+"""The live page of `sainet play`: drag disks, compare predictions, push, plan."""

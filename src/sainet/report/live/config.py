@@ -1,0 +1,97 @@
+"""Settings of the live page, free of JAX."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, get_args
+
+from sainet.control.config import ControlConfig, Goals
+from sainet.runs.errors import require, require_one_of
+from sainet.scenes.quantities import LARGEST_COUNT, require_count
+from sainet.worlds.noise import NoiseLevel
+
+WorldName = Literal["planar", "bullet", "lab"]
+DISK_COUNTS = (2, 3, 4)
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+_LARGEST_PORT = 65535
+_MOST_MODELS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlayConfig:
+    """Address of the page, and the scene that it starts with."""
+
+    model: tuple[str, ...] = ("physics", "in", "sain")
+    """Models whose predictions the page shows, or folders of trained networks; the last
+    plans at first."""
+    world: WorldName = "planar"
+    """World that executes pushes: planar, bullet, or lab (the virtual lab)."""
+    disks: int = 2
+    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
+    noise_level: NoiseLevel = "default"
+    """Scale of the world's noise; paper-like is three times the default."""
+    goals: Goals = "hard"
+    """Goals that are drawn: easy (within 30 degrees of the disks' axis) or hard (30 to
+    60 degrees to either side)."""
+    seed: int = 0
+    """Random seed of goals, friction and noise."""
+    port: int = 8642
+    """Port of the page; 0 takes any free port."""
+    host: str = "127.0.0.1"
+    """Address to listen on. Anybody who can reach another address than a loopback
+    address can use the page."""
+    name: tuple[str, ...] = ()
+    """Further host names under which browsers may open the page. Default: none."""
+    out: Path = Path("runs/play")
+    """Run folder to which the page saves episodes."""
+
+    def __post_init__(self) -> None:
+        """Check every setting."""
+        few = 0 < len(set(self.model)) == len(self.model) <= _MOST_MODELS
+        require(few, "model", f"1 to {_MOST_MODELS} different models", self.model)
+        require_one_of("world", self.world, get_args(WorldName))
+        require_count("disks", self.disks, low=DISK_COUNTS[0], high=DISK_COUNTS[-1])
+        require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
+        require_count("port", self.port, low=0, high=_LARGEST_PORT)
+        require(bool(self.host), "host", "an address of this machine", self.host)
+        self.control()
+
+    def control(self) -> ControlConfig:
+        """Return the settings of the first episode.
+
+        Raises:
+            BadSetting: the world does not have so many disks.
+        """
+        config = ControlConfig(
+            model=self.model[-1],
+            disks=self.disks,
+            noise_level=self.noise_level,
+            goals=self.goals,
+            seed=self.seed,
+        )
+        return in_world(config, self.world)
+
+    def hosts(self, port: int) -> frozenset[str]:
+        """Return the values that the header Host may have."""
+        names = {*LOOPBACK, self.host, *self.name}
+        return frozenset(names | {f"{name}:{port}" for name in names})
+
+
+def in_world(config: ControlConfig, world: WorldName) -> ControlConfig:
+    """Return the settings in another world.
+
+    Raises:
+        BadSetting: the world does not have so many disks.
+    """
+    is_lab = world == "lab"
+    two = not is_lab or config.disks == DISK_COUNTS[0]
+    require(two, "disks", "2 in the virtual lab", config.disks)
+    robot = "lab" if is_lab else "simulated"
+    engine = "planar" if is_lab else world
+    return replace(config, robot=robot, world=engine)
+
+
+def world_of(config: ControlConfig) -> WorldName:
+    """Return the name of the world that settings describe."""
+    if config.robot == "lab":
+        return "lab"
+    return "bullet" if config.world == "bullet" else "planar"
