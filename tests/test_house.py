@@ -197,6 +197,8 @@ ROBOTS = (
 WAY_IN = (
     *("api/", "control/gym", "report/live", "cli/play", "report/pictures"),
     *("report/figures/overview", "models/push_inputs"),
+    # With lines that stood in models/library.py and cli/output.py before.
+    *("models/model.py", "runs/progress.py"),
 )
 
 

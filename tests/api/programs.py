@@ -2,15 +2,20 @@
 
 PREDICT = """
 import sainet as sn
-model = sn.load("sain")                                            # predict
+
+model = sn.load("sain")  # predict; or a folder: "runs/sain"
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
 trajectory = model.predict(scene, scene.in_a_row(), sn.Push(contact_angle=0.2))
+print(trajectory.final.position)  # m, [disk, 2]
 """
 OWN_DATA = """
 import sainet as sn
-train, test = sn.open_pushes("runs/recorded").split(test=0.2, seed=0)     # own data
+
+train, test = sn.open_pushes("runs/recorded").split(test=0.2, seed=0)  # own data
 fitted = sn.identify(train)
 network = sn.tune("sain", train, engine=fitted)
 table = sn.evaluate({"physics": "physics", "fitted": fitted, "sain": network}, test)
-print(table.verdict()); table.to_pandas(); table.save("report.html")
+print(table.verdict())
+table.to_pandas()
+table.save("report.html")
 """

@@ -133,10 +133,7 @@ def check_store(store: Store) -> None:
 
 
 def identify(
-    store: Store,
-    simulator: SimulatorSpec = PLANAR,
-    *,
-    on_try: Try = lambda error: None,
+    store: Store, simulator: SimulatorSpec = PLANAR, *, on_try: Try = lambda error: None
 ) -> Identified:
     """Return estimates of frictions, pressure distribution and camera offset.
 

@@ -9,12 +9,7 @@ from jaxtyping import UInt64
 
 from sainet.engines.simulator import InternalEngine
 from sainet.models.card import CARD, Card, Identified
-from sainet.models.dynamics import (
-    SAME_TIME,
-    AbstractDynamics,
-    check_purpose,
-    predict,
-)
+from sainet.models.dynamics import SAME_TIME, AbstractDynamics, check_purpose, predict
 from sainet.models.identity import ModelId
 from sainet.models.push_inputs import (
     check_axes,

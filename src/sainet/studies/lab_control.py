@@ -13,14 +13,7 @@ from sainet.control.config import ControlConfig
 from sainet.evaluation.claims import Claim, Verdict, solves_more
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
-from sainet.studies.lab_pushes import (
-    MUJOCO,
-    SAIN_TUNED,
-    WORLD,
-    JoinLabs,
-    Lab,
-    labs,
-)
+from sainet.studies.lab_pushes import MUJOCO, SAIN_TUNED, WORLD, JoinLabs, Lab, labs
 from sainet.studies.paper_setup import SAIN
 from sainet.studies.recorded_models import Variant
 from sainet.studies.simulated_control import RunTrials, published_success

@@ -107,8 +107,7 @@ def _plan(scope: Scope) -> Plan:
         }
         for name, pushes in cases.items():
             condition = Condition(
-                label=f"{surface}, {name}",
-                factors={"surface": surface, "world": name},
+                label=f"{surface}, {name}", factors={"surface": surface, "world": name}
             )
             parts.append(Evaluate((engine,), pushes, condition))
         for name, pushes in list(cases.items())[: 1 + _DRAWN]:

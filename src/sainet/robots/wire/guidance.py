@@ -8,12 +8,7 @@ from jaxtyping import Float
 
 from sainet.robots.wire.arm import AbstractArm, NoFeedback, Sample, Stroke, unwatched
 from sainet.robots.wire.clock import AbstractClock, RealClock
-from sainet.robots.wire.egm import (
-    Feedback,
-    Quaternion,
-    decode_feedback,
-    encode_command,
-)
+from sainet.robots.wire.egm import Feedback, Quaternion, decode_feedback, encode_command
 from sainet.robots.wire.limits import CYCLE, Limits, Stopped
 from sainet.robots.wire.transport import AbstractTransport
 from sainet.robots.wire.watchdog import Idle, Watchdog
