@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 
 from sainet.runs.errors import BadSetting
 from sainet.scenes.pushes import Push, PushGrid
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import gymnasium
 
 ActionKind = Literal["grid", "continuous"]
-Action = int | Int[np.ndarray, "*env"] | Float[np.ndarray, "*env 2"]
+Action = int | np.integer | Float[np.ndarray, "2"]
 
 
 class AbstractActions(ABC):

@@ -100,7 +100,7 @@ class PushDisks(gymnasium.Env[Observation, Action]):
         return running.observation, running.info()
 
     def step(
-        self, action: Action
+        self, action: object
     ) -> tuple[Observation, float, bool, bool, dict[str, object]]:
         """Execute a push and observe the disks at rest.
 

@@ -25,7 +25,7 @@ def observation_space(task: PushDisksTask) -> gymnasium.Space[Any]:
     if row > TABLE:
         wanted = f"so few that the row of {row:.1f} m is at most {TABLE:g} m long"
         raise BadSetting("disks", task.scene.body_count, wanted)
-    high = np.tile(_LARGEST, (task.scene.body_count, 1))
+    high = np.tile(_LARGEST, task.scene.body_count)
     box = gymnasium.spaces.Box
     spaces: dict[str, gymnasium.Space[Any]] = {
         "observation": box(-high, high, dtype=np.float32),
@@ -58,7 +58,7 @@ def distances(
 ) -> Float[np.ndarray, "*env"]:
     """Return the distances of positions from their goals (m)."""
     away = np.asarray(achieved, np.float32) - np.asarray(desired, np.float32)
-    return np.sqrt(np.sum(away * away, axis=-1))
+    return np.asarray(np.sqrt(np.sum(away * away, axis=-1)))
 
 
 def rewards(
@@ -73,7 +73,7 @@ def rewards(
             distance.
     """
     if kind == "dense":
-        return -distance
+        return np.asarray(-distance)
     return np.where(distance <= np.float32(tolerance), 0.0, -1.0).astype(np.float32)
 
 

@@ -18,7 +18,8 @@ from sainet.tasks.push_to_goal import PushToGoal
 class Observation(TypedDict):
     """Measured poses and the goal, in the table frame; single precision."""
 
-    observation: Float[np.ndarray, "*env disk 3"]  # x (m), y (m), angle (rad)
+    # x (m), y (m) and angle (rad) of each disk, one disk after another
+    observation: Float[np.ndarray, "*env pose"]
     achieved_goal: Float[np.ndarray, "*env 2"]  # of the target disk, m
     desired_goal: Float[np.ndarray, "*env 2"]  # m
 
@@ -68,7 +69,7 @@ class PushDisksTask:
         Raises:
             BadInput: the observation is not one of the environment.
         """
-        wanted = (self.scene.body_count, 3)
+        wanted = (3 * self.scene.body_count,)
         try:
             pose = np.asarray(observation["observation"], np.float32)
         except (KeyError, TypeError, ValueError, IndexError):
@@ -78,7 +79,7 @@ class PushDisksTask:
                 "observation: it has no poses of shape "
                 f"{wanted} under 'observation'; give what `reset` or `step` returned."
             )
-        pose = jnp.asarray(pose)
+        pose = jnp.asarray(pose.reshape(-1, 3))
         return at_rest(pose[:, :2], pose[:, 2], jnp.zeros(2, jnp.float32))
 
 
@@ -87,7 +88,7 @@ def observation_of(
 ) -> Observation:
     """Return an observation of measured poses; its arrays are new."""
     return Observation(
-        observation=np.array(pose, np.float32),
+        observation=np.array(pose, np.float32).reshape(*pose.shape[:-2], -1),
         achieved_goal=np.array(pose[..., -1, :2], np.float32),
         desired_goal=np.array(goal, np.float32),
     )

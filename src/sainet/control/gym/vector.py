@@ -102,7 +102,7 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
         return self._observation, self._infos()
 
     def step(
-        self, actions: np.ndarray
+        self, actions: object
     ) -> tuple[Observation, Float[np.ndarray, " env"], _Each, _Each, _Infos]:
         """Push in every environment and observe the disks at rest.
 
