@@ -9,6 +9,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from sainet.control.gym.registration import register_when_imported
+
 __version__ = "0.1.0"
 
 # Each public name with its module and its name there.
@@ -19,6 +21,8 @@ _HOMES = {
     for alias in node.names
 }
 __all__ = sorted(_HOMES)  # noqa: PLE0605  # pyright: ignore[reportUnsupportedDunderAll]
+
+register_when_imported()
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401

@@ -13,6 +13,8 @@ from sainet.api.pushes import open_pushes as open_pushes
 from sainet.api.table import ErrorTable as ErrorTable
 from sainet.control.config import ControlConfig as ControlConfig
 from sainet.control.episode import run_episode as run_episode
+from sainet.control.gym.policy import GreedyPlanner as GreedyPlanner
+from sainet.control.gym.policy import TreePlanner as TreePlanner
 from sainet.control.trials import run_trials as run_trials
 from sainet.datasets.config import GenerateConfig as GenerateConfig
 from sainet.datasets.store import open_store as open_store

@@ -60,7 +60,7 @@ class SimulatedRobot(AbstractRobot):
 
     def resume(self, left: State | None, *seed: int) -> None:
         """Put the disks back where a push left them, and draw noise anew."""
-        self._world = replace(self._world, rng=_generator(*seed))
+        self._world = replace(self._world, rng=robot_generator(*seed))
         if left is not None:
             self.arrange(left)
 
@@ -99,14 +99,15 @@ class SimulatedRobot(AbstractRobot):
         )
 
 
-def _generator(*seed: int) -> np.random.Generator:
+def robot_generator(*seed: int) -> np.random.Generator:
+    """Return the generator of a robot's table and noise."""
     return np.random.default_rng([_WORLD, *seed])
 
 
 def simulated_robot(config: RobotConfig, *seed: int) -> SimulatedRobot:
     """Return a robot in a world whose friction and noise are drawn from numbers."""
-    rng = _generator(*seed)
-    friction = float(rng.uniform(*bounds(WorldConfig.table_friction)))
+    rng = robot_generator(*seed)
+    friction = draw_friction(rng)
     scene = scene_of(MASS, RADIUS, config.disks, friction)
     return _robot(config, scene, rng)
 
@@ -131,6 +132,11 @@ def _robot(
     return SimulatedRobot(world, scene, in_a_row(np.asarray(scene.radius)))
 
 
+def draw_friction(rng: np.random.Generator) -> float:
+    """Return the friction coefficient of a random table."""
+    return float(rng.uniform(*bounds(WorldConfig.table_friction)))
+
+
 def scene_of(
     mass: tuple[float, ...], radius: tuple[float, ...], disks: int, friction: float
 ) -> Scene:
@@ -143,8 +149,8 @@ def scene_of(
     return Scene.disks(each(mass), each(radius), table_friction=friction)
 
 
-_STILL = 1e-4  # m
-_DEEPEST = 1e-3  # m, more than the noise of motion capture
+STILL = 1e-4  # m, of disk 1: a push that moves it less is useless
+DEEPEST = 1e-3  # m, more than the noise of motion capture
 
 
 def _pose(state: State) -> Float[np.ndarray, "*batch body 3"]:
@@ -154,7 +160,7 @@ def _pose(state: State) -> Float[np.ndarray, "*batch body 3"]:
 def _start_trouble(scene: Scene, initial: State) -> str:
     """Return whether the pusher starts inside another disk than the pushed one."""
     depth = -np.asarray(pusher_gaps(scene, initial))[0, 1:]
-    if not (depth > _DEEPEST).any():
+    if not (depth > DEEPEST).any():
         return ""
     disk = 2 + int(np.argmax(depth))
     return f"the pusher began {1000 * depth.max():.1f} mm inside disk {disk}"
@@ -165,4 +171,4 @@ def _trouble(pose: Float[np.ndarray, "sample body 3"]) -> str:
     if not np.isfinite(pose).all():
         return "simulation produced NaN or infinity"
     moved = np.linalg.norm(pose[-1, 0, :2] - pose[0, 0, :2])
-    return "" if moved > _STILL else "disk 1 did not move"
+    return "" if moved > STILL else "disk 1 did not move"

@@ -1,0 +1,1 @@
+"""Gymnasium environments of the closed loop (extra `gym`), and policies for them."""

@@ -1,0 +1,71 @@
+"""Options of the environment, the keywords of `gymnasium.make`; free of JAX."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, get_args
+
+from sainet.control.config import ControlConfig, GivenProperties, Goals
+from sainet.robots import Surface
+from sainet.runs.errors import require_one_of
+from sainet.worlds.noise import NoiseLevel
+
+if TYPE_CHECKING:
+    from sainet.control.gym.actions import ActionKind
+
+EnvironmentWorld = Literal["planar", "bullet", "lab"]
+RewardKind = Literal["sparse", "dense"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushDisksConfig:
+    """Options of `sainet/PushDisks-v0`; defaults as in `sainet control`."""
+
+    world: EnvironmentWorld = "planar"
+    """World: planar or bullet (simulated), or lab (a virtual lab, simulated in 3-D)."""
+    goals: Goals = "easy"
+    """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
+    either side)."""
+    actions: "ActionKind" = "grid"
+    """Actions: grid (an index of 72 pushes), or continuous (contact angle and push
+    direction, as fractions of 60 and 30 degrees)."""
+    reward: RewardKind = "sparse"
+    """Reward: sparse (0 at the goal, else -1) or dense (minus the measured distance of
+    the target disk from the goal, m)."""
+    noise_level: NoiseLevel = "default"
+    """Scale of the noise of planar and bullet: none, default or paper-like."""
+    disks: int = 2
+    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
+    pushes: int = 60
+    """Number of pushes after which an episode is truncated."""
+    lab: int = 0
+    """Number of the virtual lab, whose hidden properties are drawn from it."""
+    surface: Surface = "abs"
+    """Surface of the virtual lab: abs or plywood."""
+    given_properties: GivenProperties = "true"
+    """Masses and radii given to models: true, or assumed."""
+
+    def __post_init__(self) -> None:
+        """Check every option.
+
+        Raises:
+            BadSetting: an option has a value that cannot be used.
+        """
+        require_one_of("world", self.world, get_args(EnvironmentWorld))
+        require_one_of("actions", self.actions, ("grid", "continuous"))
+        require_one_of("reward", self.reward, get_args(RewardKind))
+        self.control()
+
+    def control(self, seed: int = 0) -> ControlConfig:
+        """Return the settings of `sainet control` with the same trials."""
+        in_lab = self.world == "lab"
+        return ControlConfig(
+            robot="lab" if in_lab else "simulated",
+            world="planar" if in_lab else self.world,
+            disks=self.disks,
+            noise_level=self.noise_level,
+            lab=self.lab,
+            surface=self.surface,
+            goals=self.goals,
+            pushes=self.pushes,
+            given_properties=self.given_properties,
+            seed=seed,
+        )

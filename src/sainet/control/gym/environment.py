@@ -1,0 +1,181 @@
+"""The environment `sainet/PushDisks-v0`: one trial of control after another."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sainet.control.gym.actions import ACTIONS, Action
+from sainet.control.gym.config import PushDisksConfig
+from sainet.control.gym.extra import gymnasium
+from sainet.control.gym.raster import Picture
+from sainet.control.gym.running import RunningTrial
+from sainet.control.gym.spaces import (
+    distances,
+    goal_on_table,
+    is_on_table,
+    observation_space,
+    rewards,
+)
+from sainet.control.gym.task import Observation, PushDisksTask
+from sainet.control.trial import make_trial
+from sainet.runs.errors import BadSetting, require_one_of
+from sainet.scenes.quantities import LARGEST_COUNT, require_count
+
+_RENDER_MODES = ("rgb_array",)
+_OPTIONS = ("goal", "trial")
+
+
+class PushDisks(gymnasium.Env[Observation, Action]):
+    """Push disk 1 until the target disk is at its goal.
+
+    A goal environment: `compute_reward` returns the reward for any goal. Episodes after
+    ``reset(seed=s)`` have the goals, starts, frictions and noise of the trials of
+    `sainet control` with this seed, in order. An episode terminates when the measured
+    distance from the goal is within the stopping tolerance. It is truncated after
+    `pushes` pushes, after three pushes in a row with a trouble, or when a disk leaves
+    the table. ``info["is_success"]`` is whether the true pose is within the tolerance,
+    ``info["distance"]`` the distance of the true pose from the goal (m), and
+    ``info["trouble"]`` the trouble of the last push, empty for most pushes.
+    """
+
+    metadata = {
+        "render_modes": list(_RENDER_MODES),
+        "render_fps": 4,
+    }
+
+    def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:  # noqa: ANN401
+        """Make the environment.
+
+        Args:
+            render_mode: None, or "rgb_array".
+            options: fields of `PushDisksConfig`.
+
+        Raises:
+            BadSetting: an option has a value that cannot be used.
+            MissingExtra: the world needs a package that is not installed.
+        """
+        if render_mode is not None:
+            require_one_of("render_mode", render_mode, _RENDER_MODES)
+        self.render_mode = render_mode
+        self.config = PushDisksConfig(**options)
+        control = self.config.control()
+        actions = ACTIONS[self.config.actions]()
+        self.task = PushDisksTask(make_trial(control, 0).scene, actions, control)
+        self.observation_space = observation_space(self.task)
+        self.action_space = actions.space
+        self._seed: int | None = None
+        self._next = 0  # trial
+        self._running: RunningTrial | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, object] | None = None
+    ) -> tuple[Observation, dict[str, object]]:
+        """Begin the first trial of a seed, or without a seed the next trial.
+
+        Args:
+            seed: of goals, frictions and noise.
+            options: "trial", the index of a trial, and "goal", a position (m) that
+                replaces the goal of the trial.
+
+        Raises:
+            BadInput: an option is unknown, or the goal is off the table.
+        """
+        options = options or {}
+        for name in options:
+            require_one_of("options", name, _OPTIONS)
+        goal = goal_on_table(options["goal"]) if "goal" in options else None
+        wanted = options.get("trial")
+        index = None if wanted is None else _trial(wanted)
+        super().reset(seed=seed)
+        if seed is not None:
+            self._seed, self._next = seed, 0
+        elif self._seed is None:
+            self._seed = int(self.np_random.integers(2**31))
+        self._begin(self._next if index is None else index, goal)
+        running = self._current()
+        return running.observation, running.info()
+
+    def step(
+        self, action: object
+    ) -> tuple[Observation, float, bool, bool, dict[str, object]]:
+        """Execute a push and observe the disks at rest.
+
+        Raises:
+            BadSetting: the action is outside the space; nothing was moved.
+            ResetNeeded: no episode has begun, or the last one is over.
+        """
+        running = self._current()
+        if running.is_over:
+            raise gymnasium.error.ResetNeeded("The episode is over: call `reset`.")
+        trouble = running.push(self.task.actions.pushes(action))
+        pose = running.observe()
+        lost = not is_on_table(pose)
+        if lost:  # the poses measured before are kept
+            trouble = trouble or "a disk left the table"
+        else:
+            running.pose = pose
+        observation = running.observation
+        away = distances(observation["achieved_goal"], observation["desired_goal"])
+        terminated = bool(away <= self.task.tolerance) and not lost
+        spent = running.pushes >= self.config.pushes
+        truncated = not terminated and (spent or running.is_stuck or lost)
+        running.is_over = terminated or truncated
+        reward = float(self._reward(away))
+        return observation, reward, terminated, truncated, running.info(trouble)
+
+    def compute_reward(
+        self,
+        achieved_goal: Float[np.ndarray, "*env 2"],
+        desired_goal: Float[np.ndarray, "*env 2"],
+        info: object,
+    ) -> Float[np.ndarray, "*env"]:
+        """Return the rewards of positions of the target disk, for any goals.
+
+        Args:
+            achieved_goal: measured positions of the target disk (m).
+            desired_goal: goals (m).
+            info: has no effect.
+        """
+        return self._reward(distances(achieved_goal, desired_goal))
+
+    def render(self) -> Picture | None:
+        """Return a picture of the true poses; None without a `render_mode`.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+        """
+        if self.render_mode is None:
+            return None
+        return self._current().picture(self.task.tolerance)
+
+    def _begin(self, index: int, goal: Float[np.ndarray, "2"] | None) -> None:
+        """Begin a trial of the seed, with its own goal or another one."""
+        trial = make_trial(self.config.control(self._seed or 0), index)
+        if goal is not None:
+            task = eqx.tree_at(lambda t: t.goal, trial.task, jnp.asarray(goal))
+            trial = trial._replace(task=task)
+        self._running, self._next = RunningTrial.begin(trial), index + 1
+
+    def _reward(self, distance: Float[np.ndarray, "*env"]) -> Float[np.ndarray, "*env"]:
+        return rewards(distance, tolerance=self.task.tolerance, kind=self.config.reward)
+
+    def _current(self) -> RunningTrial:
+        if self._running is None:
+            raise gymnasium.error.ResetNeeded("Call `reset` before this.")
+        return self._running
+
+
+def _trial(index: object) -> int:
+    """Return the index of a trial.
+
+    Raises:
+        BadSetting: it is no whole number from 0.
+    """
+    if not isinstance(index, int | np.integer):
+        raise BadSetting("trial", index, "a whole number, at least 0")
+    require_count("trial", int(index), low=0, high=LARGEST_COUNT)
+    return int(index)

@@ -1,0 +1,94 @@
+"""The task of an environment: what every episode has in common."""
+
+from dataclasses import dataclass
+from typing import TypedDict
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from sainet.control.config import ControlConfig
+from sainet.control.gym.actions import AbstractActions
+from sainet.runs.errors import BadInput
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, at_rest
+from sainet.tasks.push_to_goal import PushToGoal
+
+
+class Observation(TypedDict):
+    """Measured poses and the goal, in the table frame; single precision."""
+
+    # x (m), y (m) and angle (rad) of each disk, one disk after another
+    observation: Float[np.ndarray, "*env pose"]
+    achieved_goal: Float[np.ndarray, "*env 2"]  # of the target disk, m
+    desired_goal: Float[np.ndarray, "*env 2"]  # m
+
+
+@dataclass(frozen=True)
+class PushDisksTask:
+    """The disks, the actions and the tolerance of all episodes of an environment.
+
+    The goal differs between episodes and is part of every observation.
+    """
+
+    scene: Scene  # properties given to models: never true frictions
+    actions: AbstractActions
+    config: ControlConfig
+
+    @property
+    def target(self) -> int:
+        """The index of the target disk."""
+        return self.scene.body_count - 1
+
+    @property
+    def tolerance(self) -> float:
+        """The measured distance from the goal that ends an episode (m)."""
+        return self.config.stopping_tolerance * self.success_radius
+
+    @property
+    def success_radius(self) -> float:
+        """The true distance from the goal that counts as success (m)."""
+        return self.config.tolerance * float(self.scene.radius[self.target])
+
+    def towards(self, goal: Float[np.ndarray, "2"]) -> PushToGoal:
+        """Return the task of an episode, which ends at the stopping tolerance.
+
+        Args:
+            goal: wanted position of the target disk, m.
+        """
+        return PushToGoal(
+            jnp.asarray(goal, jnp.float32),
+            self.target,
+            self.config.stopping_tolerance * self.config.tolerance,
+            self.config.alignment,
+        )
+
+    def state(self, observation: Observation) -> State:
+        """Return the observed poses as a state at rest; the pusher is not placed.
+
+        Raises:
+            BadInput: the observation is not one of the environment.
+        """
+        wanted = (3 * self.scene.body_count,)
+        try:
+            pose = np.asarray(observation["observation"], np.float32)
+        except (KeyError, TypeError, ValueError, IndexError):
+            pose = np.empty(0, np.float32)
+        if pose.shape != wanted:
+            raise BadInput(
+                "observation: it has no poses of shape "
+                f"{wanted} under 'observation'; give what `reset` or `step` returned."
+            )
+        pose = jnp.asarray(pose.reshape(-1, 3))
+        return at_rest(pose[:, :2], pose[:, 2], jnp.zeros(2, jnp.float32))
+
+
+def observation_of(
+    pose: Float[np.ndarray, "*env disk 3"], goal: Float[np.ndarray, "*env 2"]
+) -> Observation:
+    """Return an observation of measured poses; its arrays are new."""
+    return Observation(
+        observation=np.array(pose, np.float32).reshape(*pose.shape[:-2], -1),
+        achieved_goal=np.array(pose[..., -1, :2], np.float32),
+        desired_goal=np.array(goal, np.float32),
+    )
