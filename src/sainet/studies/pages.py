@@ -19,6 +19,7 @@ from sainet.evaluation.claims import places
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
 from sainet.report.palette import labels_of
+from sainet.report.pictures import draw_pictures
 from sainet.report.verdicts import beside_published, rulings, worded_places
 from sainet.report.writers import (
     ESTIMATE_HEADINGS,
@@ -231,12 +232,13 @@ def with_block(text: str, block: str) -> str:
 
 
 def draw_figures(root: Path) -> None:
-    """Draw the figures of studies from their measurements."""
+    """Draw the figures of studies from their measurements, and explaining pictures."""
     evidence = Evidence(root)
     for name in STUDIES:
         study = load_study(name)
         if study.figure is not None:
             study.figure(evidence.summary(name), root / FIGURES / study.figure_name)
+    draw_pictures(root / FIGURES)
 
 
 def main() -> None:
