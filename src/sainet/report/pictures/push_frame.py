@@ -26,11 +26,11 @@ _DISK_1 = (0.0, 0.0)
 def draw_push_frame(path: Path) -> Path:
     """Draw the angles that describe a push, and the frame in which networks predict."""
     with house_look():
-        figure = new_figure(8.6, 3.6)
+        figure = new_figure(8.6, 3.7)
         left, right = figure.subplots(1, 2)
         for axes, title in ((left, "The angles of a push"), (right, "The push frame")):
-            prepare(axes, (-125, 178), (-122, 108))
-            axes.set_title(title)
+            prepare(axes, (-125, 178), (-122, 126))
+            note(axes, (-125, 117), title, size=10, align="left", bold=True)
         _draw_angles(left)
         _draw_frame(right)
         return save(figure, path)
