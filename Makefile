@@ -25,7 +25,7 @@ COMPILE := $(PLAIN_PIP) .venv-lock/bin/pip-compile --quiet --build-deps-for whee
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 UPGRADE ?=
 
-.PHONY: help setup setup-dev test demo check format bench lock lower-bounds torch-env clean
+.PHONY: help setup setup-dev test demo check format bench docs lock lower-bounds torch-env clean
 
 help:  ## List the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) \
@@ -58,6 +58,11 @@ format: setup-dev  ## Rewrite the sources the way `make check` wants them
 # 'sainet identify', and files with the JSON of 'sainet bench'.
 pages: setup  ## Render docs/results/, figures and README.md from results/
 	$(BIN)/python -m sainet.studies.pages $(KEEP)
+
+# The programs of the tutorials run; DOCS_ARGS='-D nb_execution_mode=off' leaves them out.
+docs: setup-dev  ## Build the documentation in docs/_build/html/index.html
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/sphinx-build -q -W --keep-going -E -j 2 \
+		-b html $(DOCS_ARGS) docs docs/_build/html
 
 bench: setup-dev  ## Run the benchmarks
 	$(BIN)/sainet bench

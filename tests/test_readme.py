@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import sys
 import pytest
 
 from api.programs import OWN_DATA, PREDICT
+from sainet import __version__
 from support import REPOSITORY
 
 README = REPOSITORY / "README.md"
@@ -84,12 +86,41 @@ def test_the_programs_of_the_readme_are_those_that_tests_run():
         assert statements(code)[: len(statements(tested))] == statements(tested)
 
 
-def test_every_make_target_of_the_readme_exists():
+def site_contents() -> tuple[dict[str, list[str]], set[str]]:
+    """Return the pages of the site by section, and the pages that `make docs` runs."""
+    path = REPOSITORY / "docs" / "site_pages" / "contents.py"
+    found = runpy.run_path(str(path))
+    return found["CONTENTS"], found["EXECUTED"]
+
+
+def test_the_site_runs_every_page_with_python_in_it():
+    _, executed = site_contents()
+    with_python = {
+        page.stem for page in PAGES[1:] if "\n```python\n" in page.read_text()
+    }
+    assert with_python <= executed
+    assert "make docs" in (REPOSITORY / ".ci" / "run").read_text()
+
+
+def test_every_page_of_the_site_is_in_its_contents_once():
+    contents, executed = site_contents()
+    listed = [name for names in contents.values() for name in names]
+    found = {page.stem for page in PAGES[1:]} - {"index"} | {"results/index"}
+    assert sorted(listed) == sorted(found)
+    assert executed < found
+
+
+def test_the_citation_file_has_the_version_of_the_package():
+    text = (REPOSITORY / "CITATION.cff").read_text()
+    assert re.findall(r"^version: (.+)$", text, re.MULTILINE) == [__version__]
+
+
+def test_every_documented_make_target_exists():
     makefile = (REPOSITORY / "Makefile").read_text()
     targets = set(re.findall(r"^([a-z][a-z-]*):", makefile, re.MULTILINE))
-    named = make_targets(README.read_text())
-    assert {"demo", "test"} <= named
-    assert named <= targets
+    assert {"demo", "test"} <= make_targets(README.read_text())
+    for page in PAGES:
+        assert make_targets(page.read_text()) <= targets, page.name
 
 
 def test_the_readme_names_the_test_command_that_ci_runs():

@@ -120,7 +120,7 @@ def robot_among(config: RobotConfig, scene: Scene, *seed: int) -> SimulatedRobot
         scene: one scene; its table friction is not drawn.
         seed: numbers from which the noise is drawn.
     """
-    return _robot(config, scene, _generator(*seed))
+    return _robot(config, scene, robot_generator(*seed))
 
 
 def _robot(

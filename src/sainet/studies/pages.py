@@ -20,6 +20,7 @@ from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
 from sainet.report.figures.overview import Part, draw_errors_over_physics, draw_success
 from sainet.report.palette import labels_of
+from sainet.report.pictures import draw_pictures
 from sainet.report.verdicts import beside_published, rulings, worded_places
 from sainet.report.writers import (
     ESTIMATE_HEADINGS,
@@ -272,7 +273,7 @@ _SUCCESS_OF = (
 
 
 def draw_figures(root: Path) -> None:
-    """Draw the overviews, and the figures of studies, from their measurements."""
+    """Draw overviews and figures of studies from measurements, and the pictures."""
     evidence, figures = Evidence(root), root / FIGURES
 
     def parts(of: Iterable[tuple[str, str, str]]) -> list[Part]:
@@ -284,6 +285,7 @@ def draw_figures(root: Path) -> None:
         study = load_study(name)
         if study.figure is not None:
             study.figure(evidence.summary(name), figures / study.figure_name)
+    draw_pictures(figures)
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int
 
 from sainet.control.config import ControlConfig
 from sainet.engines import make_engine
-from sainet.planning.outcomes import batch_of
+from sainet.planning.levels import batch_of
 from sainet.robots.simulated import (
     DEEPEST,
     MASS,

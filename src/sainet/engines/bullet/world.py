@@ -4,7 +4,7 @@ A disk is a cylinder on four small feet, two thirds of its radius from the centr
 its centre of mass in the plane of the table. A bare cylinder touches a plane at points
 on its rim that Bullet selects anew in every step: it tilts, rotates while it coasts,
 and its friction varies with its heading by 9 %. The feet distribute the weight like a
-uniform pressure; `docs/theory.md` compares both.
+uniform pressure; `docs/engine.md` compares both.
 """
 
 import ctypes
