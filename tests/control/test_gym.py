@@ -196,7 +196,7 @@ def test_unknown_names_are_named():
         ("world='havok'", "`world` is havok; it must be one of planar, bullet, lab"),
         ("goals='harder'", "did you mean hard?"),
     ):
-        code = f"import sainet, gymnasium; gymnasium.make('{PUSH_DISKS}', {options})"
+        code = f"import gymnasium, sainet; gymnasium.make('{PUSH_DISKS}', {options})"
         assert says in run(code).stderr.splitlines()[-1]
 
 
@@ -325,8 +325,8 @@ def test_bad_input_of_many_environments_is_named(many):
 @pytest.mark.parametrize(
     "code",
     [
-        "import sainet, gymnasium",
         "import gymnasium, sainet",
+        "import sainet, gymnasium; sainet.ControlConfig",  # any name of sainet
     ],
 )
 def test_the_environment_is_registered_in_any_order_of_imports(code):

@@ -18,9 +18,7 @@ import jinja2
 from sainet.evaluation.claims import places
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
-from sainet.report.figures.overview import Part, draw_errors_over_physics, draw_success
 from sainet.report.palette import labels_of
-from sainet.report.pictures import draw_pictures
 from sainet.report.verdicts import beside_published, rulings, worded_places
 from sainet.report.writers import (
     ESTIMATE_HEADINGS,
@@ -38,6 +36,7 @@ from sainet.studies.evidence import (
     described,
     keep,
 )
+from sainet.studies.page_figures import draw_figures
 from sainet.studies.study import Choice
 
 TEMPLATES, PAGES = "docs/templates", "docs/results"
@@ -252,42 +251,6 @@ def with_block(text: str, block: str) -> str:
     return before + begin + block + end + after
 
 
-# Conditions of the overviews: title, study, label.
-_ERRORS_OF = (
-    ("Table I: a force, two disks", "direct-force-two-disks", ""),
-    ("Table II: three disks", "direct-force-three-disks", ""),
-    ("Table III: the robot, two disks", "robot-two-disks", ""),
-    ("Table IV, in the virtual lab", "lab-prediction", "tests on ABS"),
-)
-_SUCCESS_OF = (
-    ("Simulation, easy goals", "simulated-control", "easy, greedy"),
-    ("Simulation, hard goals", "simulated-control", "hard, greedy"),
-    (
-        "Simulation, three disks, easy goals",
-        "simulated-control",
-        "easy, tree, three disks",
-    ),
-    ("Virtual lab, easy goals", "lab-control", "easy"),
-    ("Virtual lab, hard goals", "lab-control", "hard"),
-)
-
-
-def draw_figures(root: Path) -> None:
-    """Draw overviews and figures of studies from measurements, and the pictures."""
-    evidence, figures = Evidence(root), root / FIGURES
-
-    def parts(of: Iterable[tuple[str, str, str]]) -> list[Part]:
-        return [Part(title, evidence.summary(name), label) for title, name, label in of]
-
-    draw_errors_over_physics(parts(_ERRORS_OF), figures / "errors-over-physics.svg")
-    draw_success(parts(_SUCCESS_OF), figures / "goals-solved.svg")
-    for name in STUDIES:
-        study = load_study(name)
-        if study.figure is not None:
-            study.figure(evidence.summary(name), figures / study.figure_name)
-    draw_pictures(figures)
-
-
 def main() -> None:
     """Keep the evidence in the given paths, then write every page."""
     root = Path.cwd()
@@ -295,7 +258,7 @@ def main() -> None:
         keep(Path(path), root)
     for path, text in rendered(root).items():
         write_bytes(path, text.encode())
-    draw_figures(root)
+    draw_figures(Evidence(root), root / FIGURES)
 
 
 if __name__ == "__main__":
