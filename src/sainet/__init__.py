@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sainet.control.gym.registration import register_if_imported
+from sainet.control.gym.registration import register_when_imported
 
 __version__ = "0.1.0"
 
@@ -22,14 +22,13 @@ _HOMES = {
 }
 __all__ = sorted(_HOMES)  # noqa: PLE0605  # pyright: ignore[reportUnsupportedDunderAll]
 
-register_if_imported()
+register_when_imported()
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401
     """Load a public name from its home when it is first asked for."""
     if name not in _HOMES:
         raise AttributeError(f"module 'sainet' has no attribute {name!r}")
-    register_if_imported()  # Gymnasium may have been imported since
     module, attribute = _HOMES[name]
     return getattr(import_module(module), attribute)
 
