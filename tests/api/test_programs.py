@@ -57,5 +57,5 @@ def test_compiled_programs_are_kept_for_the_next_script(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""  # no progress, no warning
-    folder = Path(done.stdout.strip())
+    folder = Path(done.stdout.splitlines()[-1])
     assert folder.parent == tmp_path / "sainet"

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from datasets.stores import assert_same_files, contents, small, start_generating
-from sainet.datasets import writer
+from sainet.datasets import schema, writer
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
@@ -46,7 +46,7 @@ def test_killed_runs_resume_to_the_same_bytes(whole_store, tmp_path):
         wait_for(lambda n=receipts: _receipts(out) >= n and out.exists(), process)
         process.send_signal(signal.SIGKILL)
         process.communicate()
-        assert not (out / writer.HASHES).exists()
+        assert not (out / schema.HASHES).exists()
     generate(small(), out)
     assert_same_files(out, whole_store)
 
@@ -134,8 +134,8 @@ def test_other_seeds_make_other_pushes(whole_store, tmp_path):
 def test_a_damaged_chunk_is_made_again(whole_store, tmp_path):
     out = tmp_path / "store"
     shutil.copytree(whole_store, out)
-    hashes = json.loads((out / writer.HASHES).read_text())["files"]
-    (out / writer.HASHES).unlink()
+    hashes = json.loads((out / schema.HASHES).read_text())["files"]
+    (out / schema.HASHES).unlink()
     info = open_store(whole_store).info
     (out / writer.PROGRESS).mkdir()
     for index in range(info.chunks):
