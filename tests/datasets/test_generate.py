@@ -141,10 +141,10 @@ def test_a_damaged_chunk_is_made_again(whole_store, tmp_path):
     for index in range(info.chunks):
         receipt = {name: hashes[name] for name in writer.chunk_files(info, index)}
         path = out / writer.PROGRESS / f"chunk-{index:06d}.json"
-        write_document(path, writer.Listing(files=receipt))
-    (out / writer.ARRAYS / "truth" / "c" / "2" / "0" / "0" / "0").write_bytes(b"x")
-    (out / writer.ARRAYS / "truth" / "c" / "1" / "0" / "0" / "0").unlink()
-    (out / writer.ARRAYS / "truth" / "c" / "3.0.partial").write_bytes(b"x")
+        write_document(path, schema.Listing(files=receipt))
+    (out / schema.ARRAYS / "truth" / "c" / "2" / "0" / "0" / "0").write_bytes(b"x")
+    (out / schema.ARRAYS / "truth" / "c" / "1" / "0" / "0" / "0").unlink()
+    (out / schema.ARRAYS / "truth" / "c" / "3.0.partial").write_bytes(b"x")
     assert writer.missing_chunks(out, info) == [1, 2]
     generate(small(), out)
     assert_same_files(out, whole_store)

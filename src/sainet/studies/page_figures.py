@@ -25,6 +25,7 @@ _SUCCESS_OF = (
     ),
     ("Virtual lab, easy goals", "lab-control", "easy"),
     ("Virtual lab, hard goals", "lab-control", "hard"),
+    ("The same, larger weight of alignment", "lab-control", "hard, alignment 10"),
 )
 
 
