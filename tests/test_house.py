@@ -211,8 +211,8 @@ ADDED = modules_of(ROBOTS)
 REBUILT = [path for path in MODULES if path not in ADDED + modules_of(WAY_IN)]
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
-    "modules": (lambda: len(REBUILT), 180, 150),
-    "code lines in src": (lambda: sum(map(code_lines, REBUILT)), 15_500, 11_000),
+    "modules": (lambda: len(REBUILT), 168, 150),
+    "code lines in src": (lambda: sum(map(code_lines, REBUILT)), 15_450, 11_000),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),
     "code lines of laboratory and robot": (
         lambda: sum(map(code_lines, ADDED)),
