@@ -29,7 +29,8 @@ exclude_patterns = ["_build", "site_pages", "templates"]
 nitpicky = True
 # Types of other packages and of internal modules: the site has no pages of theirs.
 nitpick_ignore_regex = [("py:.*", r".*")]
-suppress_warnings = ["config.cache"]
+# Colours in the outputs of commands are no language that can be highlighted.
+suppress_warnings = ["config.cache", "misc.highlighting_failure"]
 
 myst_enable_extensions = ["attrs_inline"]
 myst_heading_anchors = 4
