@@ -195,8 +195,15 @@ ROBOTS = (
     "robots/__init__",
 )
 WAY_IN = (
-    *("api/", "control/gym", "report/live", "cli/play", "report/pictures"),
-    *("report/figures/overview", "models/push_inputs"),
+    *(
+        "api/",
+        "control/gym",
+        "control/worlds",
+        "report/live",
+        "cli/play",
+        "report/pictures",
+    ),
+    *("report/pictures", "report/figures/overview", "models/push_inputs"),
     # With lines that stood in models/library.py and cli/output.py before.
     *("models/model.py", "runs/progress.py"),
 )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from sainet.control.config import ControlConfig, GivenProperties, Goals
+from sainet.control.worlds import WorldName, in_world
 from sainet.robots import Surface
 from sainet.runs.errors import require_one_of
 from sainet.worlds.noise import NoiseLevel
@@ -11,7 +12,6 @@ from sainet.worlds.noise import NoiseLevel
 if TYPE_CHECKING:
     from sainet.control.gym.actions import ActionKind
 
-EnvironmentWorld = Literal["planar", "bullet", "lab"]
 RewardKind = Literal["sparse", "dense"]
 
 
@@ -19,7 +19,7 @@ RewardKind = Literal["sparse", "dense"]
 class PushDisksConfig:
     """Options of `sainet/PushDisks-v0`; defaults as in `sainet control`."""
 
-    world: EnvironmentWorld = "planar"
+    world: WorldName = "planar"
     """World: planar or bullet (simulated), or lab (a virtual lab, simulated in 3-D)."""
     goals: Goals = "easy"
     """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
@@ -49,17 +49,14 @@ class PushDisksConfig:
         Raises:
             BadSetting: an option has a value that cannot be used.
         """
-        require_one_of("world", self.world, get_args(EnvironmentWorld))
+        require_one_of("world", self.world, get_args(WorldName))
         require_one_of("actions", self.actions, ("grid", "continuous"))
         require_one_of("reward", self.reward, get_args(RewardKind))
         self.control()
 
     def control(self, seed: int = 0) -> ControlConfig:
         """Return the settings of `sainet control` with the same trials."""
-        in_lab = self.world == "lab"
-        return ControlConfig(
-            robot="lab" if in_lab else "simulated",
-            world="planar" if in_lab else self.world,
+        usual = ControlConfig(
             disks=self.disks,
             noise_level=self.noise_level,
             lab=self.lab,
@@ -69,3 +66,4 @@ class PushDisksConfig:
             given_properties=self.given_properties,
             seed=seed,
         )
+        return in_world(usual, self.world)

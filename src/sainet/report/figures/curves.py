@@ -1,6 +1,7 @@
 """Curves of learning: losses over iterations, errors over training pushes."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -118,7 +119,8 @@ def draw_history(model: str, log: Sequence[LogLine], path: Path) -> Path:
 FACTOR = "training_pushes"
 _METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
 _TICKS = (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 15, 20)  # mm or degrees
-_WIDE = 4  # ratio of errors from which a scale is logarithmic
+# Ratios: of sizes whose labels do not touch; of errors on a logarithmic scale.
+_APART, _WIDE = 1.6, 4
 
 
 class _Row(NamedTuple):
@@ -207,7 +209,10 @@ def _set_axes(axes: Axes, sizes: list[int]) -> None:
     axes.set_xscale("log")
     axes.set_xlabel("training pushes")
     axes.xaxis.set_major_locator(FixedLocator(sizes))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.0f}"))
+    # Two labels that are close would touch: the last one is written.
+    apart = {a for a, b in pairwise([*sizes, np.inf]) if b > _APART * a}
+    label = FuncFormatter(lambda x, _: f"{x:,.0f}" if round(x) in apart else "")
+    axes.xaxis.set_major_formatter(label)
     axes.xaxis.set_minor_locator(NullLocator())
     canvas.add_grid(axes)
 

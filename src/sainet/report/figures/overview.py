@@ -150,7 +150,8 @@ def _draw(axes: Axes, sections: Sequence[Section]) -> None:
     canvas.add_grid(axes, "x")
     if any(dot.published is not None for section in sections for dot in section.dots):
         mark = Line2D([], [], label="published", **_published(INK))
-        axes.legend(handles=[mark], loc="lower right")
+        # Above the rows: below them are dots.
+        axes.legend(handles=[mark], loc="lower right", bbox_to_anchor=(1, 1))
 
 
 def _published(color: str) -> canvas.LineLook:

@@ -1,15 +1,15 @@
 """Settings of the live page, free of JAX."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from sainet.control.config import ControlConfig, Goals
+from sainet.control.worlds import WorldName, in_world
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import LARGEST_COUNT, require_count
 from sainet.worlds.noise import NoiseLevel
 
-WorldName = Literal["planar", "bullet", "lab"]
 DISK_COUNTS = (2, 3, 4)
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 _LARGEST_PORT = 65535
@@ -74,24 +74,3 @@ class PlayConfig:
         """Return the values that the header Host may have."""
         names = {*LOOPBACK, self.host, *self.name}
         return frozenset(names | {f"{name}:{port}" for name in names})
-
-
-def in_world(config: ControlConfig, world: WorldName) -> ControlConfig:
-    """Return the settings in another world.
-
-    Raises:
-        BadSetting: the world does not have so many disks.
-    """
-    is_lab = world == "lab"
-    two = not is_lab or config.disks == DISK_COUNTS[0]
-    require(two, "disks", "2 in the virtual lab", config.disks)
-    robot = "lab" if is_lab else "simulated"
-    engine = "planar" if is_lab else world
-    return replace(config, robot=robot, world=engine)
-
-
-def world_of(config: ControlConfig) -> WorldName:
-    """Return the name of the world that settings describe."""
-    if config.robot == "lab":
-        return "lab"
-    return "bullet" if config.world == "bullet" else "planar"

@@ -4,7 +4,8 @@ from typing import Annotated, ClassVar
 
 import msgspec
 
-from sainet.report.live.config import DISK_COUNTS, WorldName
+from sainet.control.worlds import WorldName
+from sainet.report.live.config import DISK_COUNTS
 from sainet.runs.errors import BadInput, shown
 from sainet.worlds.noise import NoiseLevel
 

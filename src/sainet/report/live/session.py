@@ -10,11 +10,12 @@ from sainet.control.config import ControlConfig
 from sainet.control.episode import ControlStep, Episode, checked
 from sainet.control.record import poses_of, record_step
 from sainet.control.trial import Trial, with_goal
+from sainet.control.worlds import in_world, world_of
 from sainet.models.library import Model, load_model
 from sainet.planning.base import Plan
 from sainet.planning.checks import check_observation, doubts
 from sainet.report.live.album import CHOSEN, Album, Take
-from sainet.report.live.config import PlayConfig, in_world, world_of
+from sainet.report.live.config import PlayConfig
 from sainet.report.live.messages import (
     Action,
     Aim,

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from sainet.control.config import ControlConfig
 from sainet.control.record import StepRecord, listed_poses, poses_of
 from sainet.control.trial import Trial
-from sainet.report.live.config import WorldName, world_of
+from sainet.control.worlds import WorldName, world_of
 from sainet.report.live.predictions import STROKE, Difference, Path
 from sainet.report.live.table import Table
 from sainet.worlds.noise import NoiseLevel

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from sainet.control.config import ControlConfig
 from sainet.control.trial import Trial, with_goal
+from sainet.control.worlds import WorldName, world_of
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
-from sainet.report.live.config import WorldName, world_of
 from sainet.report.live.messages import Status
 from sainet.report.live.predictions import Moment, Predictor, push_at
 from sainet.report.live.world import make_world

@@ -3,15 +3,14 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics, predict
+from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics
 from sainet.models.library import load_model
+from sainet.models.push_inputs import predict_push
 from sainet.report.figures.canvas import (
     add_grid,
     house_look,
@@ -21,9 +20,8 @@ from sainet.report.figures.canvas import (
 )
 from sainet.report.palette import INK, MOVED, PUSHED, style_of
 from sainet.report.pictures.drawing import arrow, disk, note, prepare
-from sainet.scenes.pushes import Push, command_path
+from sainet.scenes.pushes import Push
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import at_rest
 
 _STEPS = 80  # 48 of motion, 32 at rest
 _DRAWN = ("truth", "physics", "in", "sain")
@@ -32,7 +30,7 @@ _RADIUS_MM = (57.0, 51.0)
 # whose pushes the networks were trained on.
 _PRESSURE = 0.5
 
-_WHY = "assumed radii overlap at the start:\nthe engine first moves disk 1 back"
+_WHY = "assumed radii overlap\nat the start: the engine\nfirst moves disk 1 back"
 
 Paths = Mapping[str, Float[np.ndarray, "step body 2"]]
 
@@ -48,7 +46,7 @@ def draw_one_push(path: Path) -> Path:
         for body, axes in enumerate(panels):
             _draw_paths(axes, {name: each[:, body] for name, each in paths.items()})
             axes.set_title(f"Path of the centre of disk {body + 1}")
-        note(panels[0], (10.9, 0.35), _WHY, size=7.5, align="right")
+        note(panels[0], (10.9, 0.5), _WHY, size=7.5, align="right")
         figure.legend(
             *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4
         )
@@ -58,20 +56,11 @@ def draw_one_push(path: Path) -> Path:
 def _predictions() -> Paths:
     """Return the path of each disk (mm), rounded so that machines agree."""
     scene = Scene.disks(mass=[1.1, 0.87], radius=[r / 1000 for r in _RADIUS_MM])
-    touching = jnp.array([[0.0, 0.0], [sum(_RADIUS_MM) / 1000, 0.0]])
-    push = Push(
-        contact_angle=jnp.array([0.42]),
-        direction=jnp.array([-0.2]),
-        length=jnp.array([0.010]),
-        speed=jnp.array([0.050]),
-    )
-    scenes = jax.tree.map(lambda x: x[None], scene)
-    resting = at_rest(touching[None], jnp.zeros((1, 2)), touching[:1])
-    initial, controls = command_path(scenes, resting, push, steps=_STEPS)
+    start, push = scene.in_a_row(), Push(contact_angle=0.42, direction=-0.2)
     found: dict[str, Float[np.ndarray, "step body 2"]] = {}
     for name, dynamics in _models().items():
-        states = predict(dynamics, scenes, initial, controls).states
-        path = jnp.concatenate([touching[None], states.position[0]])
+        states = predict_push(dynamics, scene, start, push, _STEPS).states
+        path = np.concatenate([start.position[None], states.position])
         found[name] = np.round(1000 * np.asarray(path, float), 2)
     return found
 
