@@ -166,5 +166,6 @@ def test_a_second_server_on_the_port_ends_with_one_line(page, capsys):
 def test_what_cannot_be_served_ends_with_one_line(words, reason, capsys):
     assert run(["play", *words]) == 2
     found = capsys.readouterr()
+    assert "Open http" not in found.out + found.err  # nothing listened
     assert reason in found.err
     assert found.err.count("\n") == 1

@@ -54,6 +54,11 @@ def serve(config: PlayConfig, *, on_listening: Callable[[str], None]) -> None:
         raise MissingExtra(
             "The live page needs the package websockets: pip install 'sainet[live]'."
         )
+    from sainet.models.library import PHYSICS, network_folder
+
+    for name in config.model:
+        if name not in PHYSICS:
+            network_folder(name)  # an unknown one ends this before it listens
     asyncio.run(LivePage(config).run(on_listening))
 
 
