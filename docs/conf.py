@@ -29,8 +29,7 @@ exclude_patterns = ["_build", "site_pages", "templates"]
 nitpicky = True
 # Types of other packages and of internal modules: the site has no pages of theirs.
 nitpick_ignore_regex = [("py:.*", r".*")]
-# Colours in the outputs of commands are no language that can be highlighted.
-suppress_warnings = ["config.cache", "misc.highlighting_failure"]
+suppress_warnings = ["config.cache"]
 
 myst_enable_extensions = ["attrs_inline"]
 myst_heading_anchors = 4

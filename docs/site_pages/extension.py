@@ -1,5 +1,6 @@
 """The Sphinx extension of the site: contents, programs that run, generated pages."""
 
+import ast
 import re
 from pathlib import Path
 
@@ -43,7 +44,21 @@ _GENERATED = {
     "models": model_zoo,
 }
 _PLACE = "<!-- generated -->"  # of the generated text; else it comes last
-_SHELL = "%%bash -e\n"
+# A cell that runs commands. A kernel's own magic colours outputs and breaks lines.
+_SHELL = "commands = "
+_RUN = """
+import os, subprocess
+
+plain = {k: v for k, v in os.environ.items() if k not in ("FORCE_COLOR", "CLICOLOR")}
+plain |= {"COLUMNS": "88", "NO_COLOR": "1", "TERM": "dumb"}
+done = subprocess.run(
+    ["bash", "-ec", commands], env=plain, text=True,
+    stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+)
+if done.stdout.strip():
+    print(done.stdout)
+assert done.returncode == 0, done.returncode
+"""
 _REMOTE = re.compile(
     r"<(?:script|img|iframe|source|video)[^>]*\ssrc=\"(?:https?:)?//"
     r"|<link[^>]*rel=\"(?:stylesheet|preload|preconnect)\"[^>]*href=\"(?:https?:)?//"
@@ -53,7 +68,7 @@ _REMOTE = re.compile(
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect the extension to Sphinx."""
     app.connect("source-read", _prepare)
-    app.connect("doctree-read", _hide_shell_magic)
+    app.connect("doctree-read", _show_commands)
     app.connect("autodoc-process-docstring", add_fields)
     app.connect("autodoc-process-signature", _short_signature)
     app.connect("build-finished", _refuse_remote_parts)
@@ -86,8 +101,9 @@ def _as_text(link: re.Match[str]) -> str:
 
 def _cell(block: re.Match[str]) -> str:
     language, code = block.groups()
-    magic = _SHELL if language == "bash" else ""
-    return f"```{{code-cell}} ipython3\n{magic}{code}```"
+    if language == "bash":
+        code = f"{_SHELL}{code!r}\n{_RUN}"
+    return f"```{{code-cell}} ipython3\n{code}```"
 
 
 def _toctree(pages: list[str], caption: str = "") -> str:
@@ -96,12 +112,13 @@ def _toctree(pages: list[str], caption: str = "") -> str:
     return f"\n\n```{{toctree}}\n:hidden:\n{title}\n{names}\n```\n"
 
 
-def _hide_shell_magic(app: Sphinx, document: nodes.document) -> None:
+def _show_commands(app: Sphinx, document: nodes.document) -> None:
     """Show commands as a reader types them."""
     for block in document.findall(nodes.literal_block):
         text = block.astext()
         if text.startswith(_SHELL):
-            shown = text.removeprefix(_SHELL)
+            literal = text.removeprefix(_SHELL).partition("\n")[0]
+            shown = ast.literal_eval(literal)
             block.rawsource = shown
             block.children = [nodes.Text(shown)]
             block["language"] = "bash"
