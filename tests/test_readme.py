@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from api.programs import OWN_DATA, PREDICT
+from api.programs import CONTROL, OWN_DATA, PREDICT
 from sainet import __version__
 from support import REPOSITORY
 
@@ -81,9 +81,12 @@ def statements(code: str) -> list[str]:
 
 def test_the_programs_of_the_readme_are_those_that_tests_run():
     shown = re.findall(r"^```python\n(.*?)^```", README.read_text(), re.M | re.S)
-    assert len(shown) == 2
-    for code, tested in zip(shown, (PREDICT, OWN_DATA), strict=True):
-        assert statements(code)[: len(statements(tested))] == statements(tested)
+    tested = (PREDICT, OWN_DATA, CONTROL)
+    assert list(map(statements, shown)) == list(map(statements, tested))
+
+
+def test_the_readme_is_short():
+    assert len(README.read_text().splitlines()) <= 120
 
 
 def site_contents() -> tuple[dict[str, list[str]], set[str]]:

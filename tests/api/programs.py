@@ -19,3 +19,17 @@ print(table.verdict())
 table.to_pandas()
 table.save("report.html")
 """
+CONTROL = """
+import gymnasium
+
+import sainet as sn
+
+env = gymnasium.make("sainet/PushDisks-v0", goals="hard")
+planner = sn.TreePlanner(sn.load("sain"), env.unwrapped.task)
+observation, info = env.reset(seed=0)
+done = False
+while not done:
+    action = planner.act(observation)
+    observation, reward, terminated, truncated, info = env.step(action)
+    done = terminated or truncated
+"""

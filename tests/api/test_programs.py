@@ -3,13 +3,14 @@
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 
-from api.programs import OWN_DATA, PREDICT
+from api.programs import CONTROL, OWN_DATA, PREDICT
 from sainet.learning import recipes
-from support import SOURCE
+from support import SOURCE, require
 
 
 def run(program: str) -> dict[str, object]:
@@ -44,6 +45,12 @@ def test_own_data(folder, monkeypatch, few_iterations, capsys):
     # Nothing else was left behind.
     assert {path.name for path in folder.iterdir()} == {"runs", "report.html"}
     assert [path.name for path in (folder / "runs").iterdir()] == ["recorded"]
+
+
+def test_control():
+    require(find_spec("gymnasium"), "gymnasium is not installed")
+    names = run(CONTROL)
+    assert names["terminated"] and names["info"]["is_success"]
 
 
 def test_compiled_programs_are_kept_for_the_next_script(tmp_path):

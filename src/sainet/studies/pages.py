@@ -56,6 +56,7 @@ def helpers(evidence: Evidence) -> dict[str, object]:
     """Return the functions that templates call."""
     summary = evidence.summary
     return {
+        "summary": summary,
         "table": lambda name: to_markdown(arrange(summary(name))),
         "origin": lambda name: origin(summary(name)),
         "claims": lambda name: "\n\n".join(
@@ -67,9 +68,7 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "readings": lambda name: readings(summary(name)),
         "trainings": lambda name: trainings(summary(name)),
         "errors": lambda name, *which: errors(summary(name), *which),
-        "solved": lambda where, model, study="simulated-control": solved(
-            summary(study), where, model
-        ),
+        "solved": solved,
         "identified": lambda: identified(evidence.identifications()),
         "bench": lambda case: bench(evidence.benchmark(case)),
         "figure": lambda case, name: evidence.benchmark(case).figures[name],
