@@ -97,7 +97,7 @@ class Entry(Struct, frozen=True, kw_only=True):
 def tracks() -> dict[str, Track]:
     """Return the tracks of the benchmark by name."""
     listed = Path(__file__).with_name("tracks.toml")
-    return documents.read_document(listed, dict[str, Track], decode=toml.decode)
+    return toml.decode(documents.read_file(listed), type=dict[str, Track])
 
 
 def track(name: str) -> Track:
