@@ -22,7 +22,7 @@ CONTENTS = {
         "choices",
         "limits",
     ],
-    "Results": ["results/index", "benchmarks"],
+    "Results": ["results/index", "benchmark", "benchmarks"],
     "Reference": ["models", "cli", "api", "data-format", "glossary"],
     "Project": ["contributing", "changelog", "citing", "releasing", "licences"],
 }

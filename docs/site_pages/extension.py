@@ -10,9 +10,11 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
 
+from site_pages.benchmark import rankings
 from site_pages.contents import CONTENTS, EXECUTED
 from site_pages.fields import add_fields
 from site_pages.reference import (
+    ROOT,
     command_line,
     dataset_arrays,
     model_zoo,
@@ -37,6 +39,7 @@ _BLOCK = re.compile(r"^```(python|bash)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _NO_PAGE = re.compile(r"\[([^\]\n]+)\]\((?:\.\./)+(?!figures|results/\w)[^)#]*\)")
 _GENERATED = {
     "api": python_interface,
+    "benchmark": lambda: rankings(ROOT),
     "changelog": lambda: project_file("CHANGELOG.md"),
     "cli": command_line,
     "data-format": dataset_arrays,

@@ -1,5 +1,9 @@
 """The public names and their homes, for type checkers and for `__init__.py`."""
 
+from sainet.api.benchmark import Entry as Entry
+from sainet.api.benchmark import Track as Track
+from sainet.api.benchmark import score as score
+from sainet.api.benchmark import track as track
 from sainet.api.engines import from_step as from_step
 from sainet.api.evaluating import evaluate as evaluate
 from sainet.api.functions import from_function as from_function
