@@ -208,6 +208,15 @@ WAY_IN = (
     *("models/model.py", "runs/progress.py"),
 )
 
+TRUST = (
+    "learning/process",
+    "models/process_card",
+    "models/correctors/process",
+    "cli/process",
+    "evaluation/coverage",
+    "studies/recorded_trust",
+)
+
 
 def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
     """Modules whose paths begin with one of these."""
@@ -215,7 +224,8 @@ def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
 
 
 ADDED = modules_of(ROBOTS)
-REBUILT = [path for path in MODULES if path not in ADDED + modules_of(WAY_IN)]
+LATER = ADDED + modules_of(WAY_IN) + modules_of(TRUST)
+REBUILT = [path for path in MODULES if path not in LATER]
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
@@ -230,6 +240,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(WAY_IN))),
         3_500,
         3_500,
+    ),
+    "code lines of models that know how sure they are": (
+        lambda: sum(map(code_lines, modules_of(TRUST))),
+        1_000,
+        1_000,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

@@ -2,13 +2,15 @@
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from tyro.conf import Positional
 
 from sainet.cli.output import Json, Output
+from sainet.cli.process import ProcessJob, for_networks
 from sainet.cli.train import Job
 from sainet.learning.recipes import FROM_ENGINE, RESIDUAL, recipe_for, start_named
-from sainet.models.identity import Features, ModelKind
+from sainet.models.identity import Features, ModelKind, ProcessFeatures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,9 +50,11 @@ class Changes:
     patience: int = RESIDUAL.stopping.patience
     """Iterations without a better validation loss after which training stops; 0: all
     iterations."""
-    features: Features = RESIDUAL.features
-    """Features of the network. place: the place on the table and the absolute angle
-    too, for pushes at one place of one table."""
+    features: Features | ProcessFeatures | None = None
+    """Inputs. Of a network: paper; place adds the place on the table and the absolute
+    angle, for pushes at one place of one table (default: paper). Of a Gaussian process:
+    the contact angle; side adds the side of the disk; place adds both (default: side).
+    """
     seed: int = RESIDUAL.seed
     """Random seed."""
     log_every: int = RESIDUAL.log_every
@@ -61,8 +65,9 @@ class Changes:
 class Tune:
     """Train a network on few pushes, around an engine or from an existing network."""
 
-    model: Positional[ModelKind]
-    """Network: in (without an engine) or sain (around an engine)."""
+    model: Positional[ModelKind | Literal["gp"]]
+    """Network: in (without an engine) or sain (around an engine). gp: a Gaussian
+    process around an engine, for pushes of one or two disks."""
     data: Path
     """Dataset to train on."""
     out: Path
@@ -71,9 +76,10 @@ class Tune:
     """Start of training. engine: a network that adds to the motion of the internal
     engine, at first nothing. Otherwise a shipped network, or the folder of a trained
     one."""
-    engine: str = "planar"
-    """Internal engine of SAIN: the folder of identified parameters ('sainet identify'),
-    or a simulator whose prediction the dataset contains."""
+    engine: str | None = None
+    """Internal engine: the folder of identified parameters ('sainet identify'), or a
+    simulator whose prediction the dataset contains (default: planar for SAIN; gp
+    identifies the engine on the same pushes)."""
     group: str | None = None
     """Group of pushes to train on (default: all groups)."""
     pushes: int | None = None
@@ -84,14 +90,17 @@ class Tune:
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
-        """Train the network and draw its learning curve."""
+        """Train the network and draw its learning curve; or fit the process."""
         given = {k: v for k, v in asdict(self.changes).items() if v is not None}
-        recipe = recipe_for(start_named(self.start)).changed(**given)
+        job = self.data, self.out, self.engine, self.group, self.pushes
+        if self.model == "gp":
+            return ProcessJob(*job).run(given, asdict(Changes()), self.output)
+        recipe = recipe_for(start_named(self.start)).changed(**for_networks(given))
         return Job(
             self.model,
             self.data,
             self.out,
-            self.engine,
+            self.engine or "planar",
             group=self.group,
             pushes=self.pushes,
         ).run(recipe, self.devices, self.output)

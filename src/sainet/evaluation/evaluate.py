@@ -12,11 +12,12 @@ from sainet.datasets.batch import Prediction, PushBatch, to_batch
 from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
-from sainet.evaluation import measurements, metrics
+from sainet.evaluation import coverage, measurements, metrics
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.models.process_card import ProcessCard
 from sainet.runs.errors import BadInput, Diverged
 
 PAPER_STEPS = 200
@@ -172,11 +173,31 @@ def _errors(model: Model, pushes: _Pushes, on_pushes: OnPushes) -> metrics.Error
     store, longest = pushes.store, max(steps for _, steps in pushes.parts)
     given = model.dynamics.recall(store.push_hashes, longest, store.info.bodies)
     if given is None:
-        return pushes.errors(_predict_all(model, pushes, on_pushes))
+        poses = _predict_all(model, pushes, on_pushes)
+        return pushes.errors(poses) | _coverage(model, pushes, poses)
     on_pushes(model.name, len(given))
     if given.ndim == pushes.final.ndim:
         return metrics.final_errors(given, pushes.final)
     return pushes.errors([given[part, :steps] for part, steps in pushes.parts])
+
+
+def _coverage(
+    model: Model, pushes: _Pushes, poses: Sequence[np.ndarray]
+) -> metrics.Errors:
+    """Return the measurements of the regions in which the model expects the ends."""
+    found: list[metrics.Errors] = []
+    for (part, steps), pose, truth in zip(
+        pushes.parts, poses, pushes.truths(), strict=True
+    ):
+        some = {name: array[part] for name, array in pushes.arrays.items()}
+        batch = to_batch(some, pushes.store.info, steps=steps)
+        carry = model.dynamics.begin(batch.scene, batch.initial)
+        region = model.dynamics.region(batch.scene, carry, batch.controls)
+        if region is None:
+            return {}
+        ends = metrics.final_pose(pose, truth[1]), metrics.final_pose(*truth)
+        found.append(coverage.measured(region, *ends))
+    return {k: pushes.in_order([each[k] for each in found]) for k in found[0]}
 
 
 def _predict_all(
@@ -247,11 +268,10 @@ def _measurements(
     labels = sorted({groups[code] for code in arrays["group"]}) if groups else [""]
     places = [labels.index(groups[code] if groups else "") for code in arrays["group"]]
     rows = np.arange(store.info.pushes) if store.rows is None else np.array(store.rows)
+    unknown = np.full(final.shape[:2], np.nan)
+    names = dict.fromkeys(name for each in errors for name in each)
     return measurements.measurements_of(
-        {
-            name: np.stack([each[name][None] for each in errors])
-            for name in metrics.MEASURED
-        },
+        {k: np.stack([each.get(k, unknown)[None] for each in errors]) for k in names},
         metrics.travel_mm(arrays["initial"][..., :3].astype(np.float64), final),
         _header(models, store, labels),
         condition=np.array(places),
@@ -281,7 +301,7 @@ def _header(
     )
 
 
-def _training(name: str, card: Card) -> measurements.TrainingRun:
+def _training(name: str, card: Card | ProcessCard) -> measurements.TrainingRun:
     return measurements.TrainingRun(
         model=name,
         seed=card.recipe.seed,

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, UInt64
 
 from sainet.engines.base import AbstractEngine
-from sainet.models.correctors import AbstractCorrector, Purpose, Start
+from sainet.models.correctors import AbstractCorrector, Purpose, Region, Start
 from sainet.models.inputs import push_frame
 from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
@@ -58,6 +58,11 @@ class AbstractDynamics(eqx.Module):
             for a model that predicts here.
         """
         del hashes, steps, bodies
+        return None
+
+    def region(self, scene: Scene, carry: Carry, controls: Controls) -> Region | None:
+        """Return the regions in which pushes end; None where they are not known."""
+        del scene, carry, controls
         return None
 
     @abstractmethod
@@ -147,7 +152,7 @@ class SimulatorAugmented(AbstractDynamics):
 
     def begin(self, scene: Scene, state: State) -> Start:
         """Start both predictions at the state (eq. 2: s-bar0 = s-hat0 = s0)."""
-        return Start(state, push_frame(scene, state), state)
+        return Start(state, push_frame(scene, state), state, state)
 
     def advance(
         self, scene: Scene, carry: Start, controls: Controls, simulated: Given = None
@@ -157,7 +162,12 @@ class SimulatorAugmented(AbstractDynamics):
             assert carry.simulated is not None
             simulated = self.engine.rollout(scene, carry.simulated, controls)
         trajectory = self.network.correct(scene, carry, controls, simulated).trajectory
-        return Start(trajectory.final, carry.frame, simulated.final), trajectory
+        reached = Start(trajectory.final, carry.frame, simulated.final, carry.first)
+        return reached, trajectory
+
+    def region(self, scene: Scene, carry: Start, controls: Controls) -> Region | None:
+        """Return the regions of the corrector."""
+        return self.network.region(scene, carry, controls)
 
 
 def stored_prediction(

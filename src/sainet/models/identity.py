@@ -13,6 +13,7 @@ Kind = Literal["physics", "in", "sain", "gp", "published"]
 TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
 ModelKind = Literal["in", "sain"]  # of networks
 Features = Literal["paper", "place"]
+ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
 Variant = Literal["", "bystander", "single-steps", "for-all"]
 
 NETWORKS = get_args(ModelKind)
@@ -30,7 +31,7 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     kind: Kind
     simulator: SimulatorSpec | None = None  # the engine, or a network's internal engine
     data: TrainingData = "paper"
-    features: Features = "paper"
+    features: Features | ProcessFeatures = "paper"
     variant: Variant = ""
     name: str = ""  # given by a user or publication; replaces the computed names
 

@@ -34,6 +34,7 @@ from sainet.models.dynamics import (
 )
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.models.process_card import ProcessCard, is_process, load_process
 from sainet.models.wrappers import Restarted, with_camera
 from sainet.runs import errors
 from sainet.runs.documents import content_hash, read_file
@@ -103,7 +104,8 @@ def load_model(
     folder = network_folder(name)
     if is_identified(folder):
         return _identified_physics(folder, engine, order)
-    network, card = load_network(folder)
+    load = load_process if is_process(folder) else load_network
+    network, card = load(folder)
     dynamics: AbstractDynamics = LearnedDynamics(network)
     internal = None
     if card.identity.simulator is not None:
@@ -200,7 +202,11 @@ def network_folder(name: str) -> Path:
 
 
 def _internal(
-    folder: Path, card: Card, own: SimulatorSpec, engine: str | None, force: bool
+    folder: Path,
+    card: Card | ProcessCard,
+    own: SimulatorSpec,
+    engine: str | None,
+    force: bool,
 ) -> SimulatorSpec:
     """Return the simulator that a network is put around."""
     if engine is None or engine == own.engine:

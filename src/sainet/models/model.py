@@ -11,6 +11,7 @@ from sainet.engines.simulator import InternalEngine
 from sainet.models.card import CARD, Card, Identified
 from sainet.models.dynamics import SAME_TIME, AbstractDynamics, check_purpose, predict
 from sainet.models.identity import ModelId
+from sainet.models.process_card import ProcessCard
 from sainet.models.push_inputs import (
     check_axes,
     compiled,
@@ -33,7 +34,7 @@ class Model:
 
     id: ModelId
     dynamics: AbstractDynamics
-    card: Card | None = None
+    card: Card | ProcessCard | None = None
     folder: Path | None = None  # of a trained network or identified parameters
     digest: str | None = None  # hash of the weights or the identified parameters
     internal: InternalEngine | None = None  # that predicts s-bar for the dynamics

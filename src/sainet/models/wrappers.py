@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
 
-from sainet.models.correctors import Purpose
+from sainet.models.correctors import Purpose, Region
 from sainet.models.dynamics import AbstractDynamics, Carry, Given
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import Controls
@@ -46,6 +46,10 @@ class OffsetCamera(AbstractDynamics):
         moved = controls.moved(self._offset)
         carry, trajectory = self.dynamics.advance(scene, carry, moved, simulated)
         return carry, Trajectory(trajectory.states.with_pusher_moved(-self._offset))
+
+    def region(self, scene: Scene, carry: Carry, controls: Controls) -> Region | None:
+        """Return the regions of the wrapped model."""
+        return self.dynamics.region(scene, carry, controls.moved(self._offset))
 
     @property
     def _offset(self) -> Float[Array, "2"]:

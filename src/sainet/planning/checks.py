@@ -7,6 +7,7 @@ import numpy as np
 
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics
+from sainet.models.process_card import ProcessCard
 from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
@@ -60,7 +61,7 @@ def doubts(
             yield f"push {number}: its {name} is outside the training range of networks"
 
 
-def doubts_of_training(card: Card | None, disks: int) -> Iterator[str]:
+def doubts_of_training(card: Card | ProcessCard | None, disks: int) -> Iterator[str]:
     """Yield reasons why plans with a network may fail, from its training data.
 
     Args:

@@ -25,6 +25,7 @@ STUDIES = {
     "pretrained": "sainet.studies.pretrained:STUDY",
     "fine-tuning": "sainet.studies.fine_tuning:STUDY",
     "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
+    "recorded-trust": "sainet.studies.recorded_trust:STUDY",
     "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",
     "lab-realism": "sainet.studies.lab_realism:STUDY",
     "lab-collect": "sainet.studies.lab_pushes:STUDY",

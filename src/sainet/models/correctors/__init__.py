@@ -18,6 +18,7 @@ class Start(eqx.Module):
     predicted: State  # s-hat, fed back to the corrector
     frame: PushFrame  # of the push, fixed since its start
     simulated: State | None = None  # s-bar, fed back to the engine; None without one
+    first: State | None = None  # at which the push began; None without an engine
 
 
 class Prediction(eqx.Module):
@@ -26,6 +27,19 @@ class Prediction(eqx.Module):
     trajectory: Trajectory
     # Standard deviation of poses (m, m, rad); None where the corrector has none.
     deviation: Float[Array, "push time body 3"] | None = None
+
+
+class Region(NamedTuple):
+    """Where a push ends with a probability of 90 %: an ellipse, and an interval.
+
+    Positions are in the ellipse and angles in the interval apart, each with 90 %.
+    """
+
+    heading: Float[Array, " push"]  # rad, of the first axis of the ellipse
+    axes: Float[Array, "push body 2"]  # m, half axes along and across the push
+    turn: Float[Array, "push body"]  # rad, half width of the interval
+    # Position (m) and rotation (rad) of regions that are as large for every push.
+    plain: Float[Array, "push body 2"]
 
 
 class Purpose(NamedTuple):
@@ -59,3 +73,8 @@ class AbstractCorrector(eqx.Module):
             controls: of each push, in the table frame.
             simulated: simulator prediction, in the table frame; None without an engine.
         """
+
+    def region(self, scene: Scene, start: Start, controls: Controls) -> Region | None:
+        """Return the regions in which pushes end; None where they are not known."""
+        del scene, start, controls
+        return None

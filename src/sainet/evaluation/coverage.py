@@ -1,0 +1,125 @@
+"""Whether models know how sure they are: regions that should hold the ends of pushes.
+
+Regions of position are ellipses, those of rotation intervals, both for 90 %. Their
+quality is the interval score (Gneiting and Raftery 2007): the size of a region, plus
+twenty times as much as the end lies outside. A region of one size for all pushes,
+calibrated on the same pushes, stands beside them.
+"""
+
+from collections.abc import Sequence
+
+import msgspec
+import numpy as np
+from jaxtyping import Float
+
+from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
+from sainet.evaluation.measurements import Condition, Measurements
+from sainet.models.correctors import Region
+
+MISSED = 10.0  # penalty for each half width outside: 1 / (1 - 0.9)
+KINDS = ("pos", "rot")
+UNITS = {"pos": "mm", "rot": "deg"}
+# Names of further measurements of each push, by kind.
+INSIDE, SIZE, SCORE, PLAIN = "inside_{}", "size_{}", "score_{}", "plain_score_{}"
+MEASURED = tuple(n.format(kind) for n in (INSIDE, SIZE, SCORE, PLAIN) for kind in KINDS)
+
+
+class Coverage(msgspec.Struct, frozen=True, kw_only=True):
+    """How well the regions of one model hold the ends of one body's pushes."""
+
+    condition: str
+    model: str  # slug
+    body: int  # 1-based
+    kind: str  # pos or rot
+    count: int  # pushes
+    inside: Estimate  # %, share of the ends in their region
+    size: Estimate  # mean half width, mm or degrees
+    score: Estimate  # mean interval score, mm or degrees
+    over_plain: Estimate  # score over that of regions of one size
+
+
+def measured(
+    region: Region,
+    predicted: Float[np.ndarray, "push body 3"],
+    true: Float[np.ndarray, "push body 3"],
+) -> dict[str, Float[np.ndarray, "push body"]]:
+    """Return size and score of the region of each push, and whether it holds the end.
+
+    Args:
+        region: about the predicted end.
+        predicted: final pose (m, m, rad).
+        true: final pose that was observed.
+    """
+    off = true - predicted
+    turn = np.mod(off[..., 2] + np.pi, 2 * np.pi) - np.pi
+    axes = np.asarray(region.axes, np.float64)
+    heading = np.asarray(region.heading, np.float64)[:, None]
+    cosine, sine = np.cos(heading), np.sin(heading)
+    along = cosine * off[..., 0] + sine * off[..., 1]
+    across = cosine * off[..., 1] - sine * off[..., 0]
+    plain = np.asarray(region.plain, np.float64)
+    place = np.hypot(along / axes[..., 0], across / axes[..., 1])  # 1 on the ellipse
+    width = {"pos": 1000 * np.sqrt(axes.prod(axis=-1))}
+    width["rot"] = np.rad2deg(np.asarray(region.turn, np.float64))
+    error = {"pos": place * width["pos"], "rot": np.rad2deg(np.abs(turn))}
+    same = {"pos": 1000 * plain[..., 0], "rot": np.rad2deg(plain[..., 1])}
+    whole = {"pos": 1000 * np.hypot(along, across), "rot": error["rot"]}
+    found: dict[str, np.ndarray] = {}
+    for kind in KINDS:
+        found[INSIDE.format(kind)] = (error[kind] <= width[kind]).astype(np.float64)
+        found[SIZE.format(kind)] = width[kind]
+        found[SCORE.format(kind)] = _score(width[kind], error[kind])
+        found[PLAIN.format(kind)] = _score(same[kind], whole[kind])
+    return found
+
+
+def _score(width: np.ndarray, error: np.ndarray) -> np.ndarray:
+    return width + MISSED * np.maximum(error - width, 0.0)
+
+
+def coverage_of(measured: Measurements) -> list[Coverage]:
+    """Return the coverage of every model with regions, condition by condition."""
+    if MEASURED[0] not in measured.data:
+        return []
+    return [
+        each
+        for condition in measured.header.conditions
+        for slug in measured.slugs
+        for kind in KINDS
+        for each in _coverage(measured, condition, slug, kind)
+    ]
+
+
+def _coverage(
+    measured: Measurements, condition: Condition, slug: str, kind: str
+) -> Sequence[Coverage]:
+    part = measured.samples_of(condition)
+    folds = folds_of(
+        measured.data["fold"].values[part], are_labs=measured.header.has_labs
+    )
+
+    def sample(name: str) -> Sample:
+        return Sample(measured.values(name.format(kind), slug)[..., part, :], folds)
+
+    inside, size, score, plain = map(sample, (INSIDE, SIZE, SCORE, PLAIN))
+    if not np.isfinite(inside.values).all() or not part.any():
+        return []
+    value, low, high = inside.interval
+    share = 100 * value, 100 * low, 100 * high
+    intervals = (share, size.interval, score.interval, score.over(plain))
+    return [
+        Coverage(
+            condition=condition.label,
+            model=slug,
+            body=body + 1,
+            kind=kind,
+            count=int(part.sum()),
+            **{
+                name: estimate(interval, body)
+                for name, interval in zip(
+                    ("inside", "size", "score", "over_plain"), intervals, strict=True
+                )
+            },
+        )
+        for body in range(inside.values.shape[-1])
+    ]

@@ -1,0 +1,381 @@
+"""Fitting a Gaussian process to what an engine gets wrong, and calibrating it."""
+
+import functools
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import msgspec
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+from scipy.optimize import minimize
+from tinygp import GaussianProcess
+
+from sainet.datasets.batch import Prediction, PushBatch
+from sainet.datasets.splits import fold_of_push
+from sainet.datasets.store import Store
+from sainet.engines.simulator import InternalEngine
+from sainet.models.checkpoint import save_arrays
+from sainet.models.correctors.process import (
+    BODIES,
+    RESIDUALS,
+    kernel_of,
+    known_inputs,
+    way_of,
+)
+from sainet.models.identity import ModelId, ProcessFeatures
+from sainet.models.inputs import push_frame
+from sainet.models.process_card import (
+    ARRAYS,
+    MOST,
+    PROCESS,
+    Fitted,
+    ProcessCard,
+    ProcessSettings,
+    corrector_of,
+)
+from sainet.runs.digests import digests_to_text
+from sainet.runs.documents import content_hash, read_document, write_document
+from sainet.runs.errors import BadInput, BadStore
+from sainet.runs.folders import open_run
+from sainet.runs.interrupts import raise_if_interrupted
+from sainet.runs.manifest import MANIFEST, Manifest
+
+LEVEL = 0.9  # probability that a region holds the end of a push
+# Inputs of each kind of features; every kind has those before it.
+ADDED: Mapping[ProcessFeatures, tuple[str, ...]] = {
+    "angle": ("contact_angle", "bearing", "distance", "mass_", "radius_"),
+    "side": ("normal_on_disk",),
+    "place": ("place", "normal_on_table", "disk_on_table"),
+}
+_WORDS = {"angle": "contact angle", "side": "side of the disk", "place": "place"}
+_ENOUGH = 1000  # pushes for amplitude, length scales and noise; the rest conditions
+_FAR = 4.0  # standard deviations, outputs beyond are cut: failed recordings
+_CONSTANT = 1e-5  # standard deviation of an input, relative to its mean
+_SHORTEST = 1e-3  # m, the shortest way of the pusher that tells anything
+# Normal prior of the logarithms: amplitude, noise (of standardised outputs), lengths
+# (of standardised inputs), and bounds.
+_PRIOR = {"amplitude": 0.0, "noise": -0.7, "length": 1.0}
+_PRIOR_WIDTH = 1.5
+_BOUNDS = {"amplitude": (-4.0, 4.0), "noise": (-4.0, 4.0), "length": (-3.0, 5.0)}
+Identify = Callable[[Path], InternalEngine]
+ENGINE = "engine"  # folder, inside the run folder, of the engine identified for it
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Inputs and residuals of pushes, per metre of the pusher's way."""
+
+    names: tuple[str, ...]  # of the inputs
+    inputs: Float[np.ndarray, "push input"]
+    rates: Float[np.ndarray, "push output"]
+    way: Float[np.ndarray, " push"]  # m
+    kinds: Int[np.ndarray, " push"]  # equal for pushes that stay together
+
+    def take(self, rows: Bool[np.ndarray, " push"]) -> "Ends":
+        """Return some of the pushes."""
+        inputs, rates, way = self.inputs[rows], self.rates[rows], self.way[rows]
+        return replace(
+            self, inputs=inputs, rates=rates, way=way, kinds=self.kinds[rows]
+        )
+
+
+def fit_process(
+    store: Store,
+    out: Path,
+    internal: InternalEngine | Identify,
+    settings: ProcessSettings,
+    *,
+    on_output: Callable[[], None] = lambda: None,
+) -> None:
+    """Fit a Gaussian process to the residuals of an engine; an identical call does not.
+
+    Args:
+        store: pushes along paths, of one or two disks, observed at their ends.
+        out: the run folder.
+        internal: the engine whose residuals are learned, or a function that identifies
+            it on the same pushes, in the folder that it is given.
+        settings: features, and how to fit.
+        on_output: called after each fit of one output, `fits_of` times.
+
+    Raises:
+        BadStore: the pushes do not suffice, or forces drive the pusher.
+        BadInput: an input that was asked for is the same in all pushes.
+        RunConflict: the folder contains something else.
+    """
+    check_store(store, settings)
+    given = "identified" if callable(internal) else msgspec.to_builtins(internal)
+    config = {
+        "command": "tune",
+        "model": "gp",
+        "internal_engine": given,
+        "data": store.content,
+        **msgspec.to_builtins(settings),
+    }
+    folder = open_run(out, config, finished_by=PROCESS)
+    if folder.is_finished:
+        _log.info("%s is already finished", out)
+        return
+    if callable(internal):
+        internal = internal(out / ENGINE)
+    ends = ends_of(store, internal, settings.features)
+    fitted, loss = _fit(ends, settings, on_output)
+    arrays = _calibrate(ends, fitted, settings, store.info.time_step, on_output)
+    with jax.enable_x64(True):
+        data = save_arrays(out / ARRAYS, arrays)
+    info = store.info
+    card = ProcessCard(
+        identity=ModelId(
+            kind="gp", simulator=internal.simulator, features=settings.features
+        ),
+        kind="robot",
+        time_step=info.time_step,
+        truth_engine=info.engine,
+        camera=internal.camera,
+        data=store.content,
+        disks=info.bodies,
+        trained_pushes=len(ends.way),
+        pushes=digests_to_text(store.push_hashes()),
+        weights=content_hash(data),
+        inputs=ends.names,
+        recipe=settings,
+        manifest=read_document(out / MANIFEST, Manifest),
+        final_loss=loss,
+    )
+    write_document(out / PROCESS, card)
+
+
+def fits_of(store: Store, settings: ProcessSettings) -> int:
+    """Return how often `fit_process` calls `on_output`."""
+    return RESIDUALS * store.info.bodies * (1 + settings.folds)
+
+
+def check_store(store: Store, settings: ProcessSettings) -> None:
+    """Raise `BadStore` if a process cannot be fitted to these pushes."""
+    info, path = store.info, store.path
+    if info.kind != "robot":
+        raise BadStore(
+            f"{path}: kind is {info.kind!r}; a Gaussian process needs the path of the "
+            "pusher, give pushes of the robot setup."
+        )
+    if info.bodies > BODIES:
+        raise BadStore(
+            f"{path}: pushes of {info.bodies} disks; the inputs of a Gaussian process "
+            "describe one or two, train a network."
+        )
+    if info.pushes > MOST:
+        raise BadStore(
+            f"{path}: {info.pushes} pushes; a Gaussian process takes at most {MOST}, "
+            "choose some with `pushes`."
+        )
+    kinds = len(np.unique(store.repeats()))
+    if kinds < settings.folds:
+        raise BadStore(
+            f"{path}: {kinds} pushes that are not repeats of each other; the "
+            f"calibration needs at least {settings.folds}."
+        )
+
+
+def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -> Ends:
+    """Return inputs and residuals of all pushes whose ends were observed.
+
+    Raises:
+        BadStore: too few ends were observed.
+        BadInput: an input that was asked for is the same in all pushes.
+    """
+    prediction = Prediction(internal, store.info)
+    arrays = prediction.complete(store.read(slice(None), prediction.names))
+    inputs, rates, way = (
+        jax.tree.map(np.asarray, each) for each in _ends(prediction.batch(arrays))
+    )
+    known = np.isfinite(rates).all(axis=1) & (way > _SHORTEST)
+    if known.sum() < RESIDUALS:
+        raise BadStore(
+            f"{store.path}: {known.sum()} pushes of at least 1 mm whose ends were "
+            "observed; record more."
+        )
+    inputs = {name: value[known] for name, value in inputs.items()}
+    names = _varying(inputs, features)
+    values = np.stack([inputs[name] for name in names], axis=1).astype(np.float64)
+    rates = rates[known].astype(np.float64)
+    kinds = store.repeats()[known]
+    return Ends(names, values, rates, way[known].astype(np.float64), kinds)
+
+
+@jax.jit
+def _ends(batch: PushBatch) -> tuple[dict[str, Array], Array, Array]:
+    """Return all inputs, and the residuals per metre of way; NaN where unobserved."""
+    seen, count = batch.pose_observed, batch.truth.shape[1]
+    last = count - 1 - jnp.argmax(seen[:, ::-1], axis=1)
+    rows = jnp.arange(len(last))
+    assert batch.simulated is not None
+    missed = (batch.truth - batch.simulated)[rows, last, :, :3]
+    missed = jnp.where(seen.any(axis=1)[:, None, None], missed, jnp.nan)
+    way, heading = way_of(batch.controls, batch.initial)
+    driven = jnp.cumsum(way, axis=1)[rows, last]
+    cosine, sine = jnp.cos(heading)[:, None], jnp.sin(heading)[:, None]
+    x, y, turned = missed[..., 0], missed[..., 1], missed[..., 2]
+    turned = jnp.mod(turned + jnp.pi, 2 * jnp.pi) - jnp.pi
+    along, across = cosine * x + sine * y, cosine * y - sine * x
+    residual = jnp.stack([along, across, turned], axis=-1).reshape(len(last), -1)
+    pushed = push_frame(batch.scene, batch.initial).pushed
+    inputs = known_inputs(batch.scene, batch.initial, pushed, heading)
+    return inputs, residual / driven[:, None], driven
+
+
+def _varying(
+    inputs: Mapping[str, np.ndarray], features: ProcessFeatures
+) -> tuple[str, ...]:
+    """Return the names of the wanted inputs that vary.
+
+    Raises:
+        BadInput: none of those that were asked for does.
+    """
+    every: list[ProcessFeatures] = [*ADDED]
+    found: list[str] = []
+    for each in every[: every.index(features) + 1]:
+        varying = [
+            key
+            for key, values in inputs.items()
+            if key.startswith(ADDED[each]) and _varies(values)
+        ]
+        if not varying:
+            raise BadInput(
+                f"`features`: the {_WORDS[each]} is the same in all pushes; record "
+                "other kinds of push, or leave it out."
+            )
+        found += varying
+    return tuple(found)
+
+
+def _varies(value: np.ndarray) -> bool:
+    return float(np.std(value)) > _CONSTANT * (1e-2 + abs(float(np.mean(value))))
+
+
+def _fit(
+    ends: Ends,
+    settings: ProcessSettings,
+    on_output: Callable[[], None],
+    begin: np.ndarray | None = None,
+) -> tuple[Fitted, float]:
+    """Return the most probable process, and its mean loss for push and output.
+
+    Args:
+        ends: of the pushes.
+        settings: of the fit.
+        on_output: called after each output.
+        begin: logarithms of amplitude, noise and lengths of each output, from which a
+            fit to other pushes takes a quarter of the iterations.
+    """
+    centre, width = ends.inputs.mean(axis=0), ends.inputs.std(axis=0)
+    width = np.where(width > 0, width, 1.0)
+    inputs = (ends.inputs - centre) / width
+    mean, scale = ends.rates.mean(axis=0), ends.rates.std(axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    outputs = np.clip((ends.rates - mean) / scale, -_FAR, _FAR).T
+    some = np.random.default_rng(settings.seed).permutation(len(inputs))[:_ENOUGH]
+    found, losses = [], []
+    for output, values in enumerate(outputs):
+        raise_if_interrupted()
+        at = None if begin is None else begin[output]
+        most = settings.iterations if begin is None else 1 + settings.iterations // 4
+        best = _most_probable(inputs[some], values[some], most, at)
+        found.append(np.exp(best[0]))
+        losses.append(best[1] / len(some))
+        on_output()
+    parameters = np.stack(found)
+    fitted = Fitted(
+        inputs=inputs,
+        outputs=outputs,
+        amplitude=parameters[:, 0],
+        length=parameters[:, 2:],
+        noise=parameters[:, 1] ** 2,
+        mean=mean,
+        scale=scale,
+        centre=centre,
+        width=width,
+        reach=np.ones((len(outputs) // RESIDUALS, 2)),
+        plain=np.ones((len(outputs) // RESIDUALS, 2)),
+    )
+    return fitted, float(np.mean(losses))
+
+
+def _most_probable(
+    inputs: np.ndarray, values: np.ndarray, most: int, begin: np.ndarray | None
+) -> tuple[Float[np.ndarray, " parameter"], float]:
+    """Return the logarithms of amplitude, noise and lengths, and their loss."""
+    names = ["amplitude", "noise", *["length"] * inputs.shape[1]]
+    prior = np.array([_PRIOR[name] for name in names])
+
+    def loss(at: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = _loss_and_slope(at, inputs, values, prior)
+        return float(value), np.asarray(slope)
+
+    with jax.enable_x64(True):
+        found: Any = minimize(
+            loss,
+            prior if begin is None else begin,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[_BOUNDS[name] for name in names],
+            options={"maxiter": most},
+        )
+    return found.x, float(found.fun)
+
+
+@functools.partial(jax.jit)
+@functools.partial(jax.value_and_grad)
+def _loss_and_slope(at: Array, inputs: Array, values: Array, prior: Array) -> Array:
+    """Return the negative log density of values and parameters."""
+    kernel = kernel_of(jnp.exp(at[0]), jnp.exp(at[2:]))
+    process = GaussianProcess(kernel, inputs, diag=jnp.exp(2 * at[1]))
+    doubt = jnp.sum(((at - prior) / _PRIOR_WIDTH) ** 2) / 2
+    return doubt - process.log_probability(values)
+
+
+def _calibrate(
+    ends: Ends,
+    fitted: Fitted,
+    settings: ProcessSettings,
+    time_step: float,
+    on_output: Callable[[], None],
+) -> Fitted:
+    """Return the process with the factors of deviations that make 90 % regions.
+
+    Conformal prediction over folds: whole kinds of push are left out of the fit that
+    predicts them. Its optimiser begins at the parameters of the whole fit. `plain` is
+    the same for regions of one size everywhere.
+    """
+    owner = fold_of_push(ends.kinds, settings.folds, settings.seed)
+    noise = np.sqrt(fitted.noise)
+    begin = np.log(np.column_stack([fitted.amplitude, noise, fitted.length]))
+    scores, plain = [], []
+    for fold in range(settings.folds):
+        others, held = ends.take(owner != fold), ends.take(owner == fold)
+        part, _ = _fit(others, settings, on_output, begin)
+        process = corrector_of(part, ends.names, time_step)
+        mean, deviation = process.rates(jnp.asarray(held.inputs, jnp.float32))
+        off = held.rates - np.asarray(mean)
+        scores.append(_sizes(off / np.asarray(deviation)))
+        plain.append(_sizes(off))
+    return fitted._replace(
+        reach=quantile(np.concatenate(scores)), plain=quantile(np.concatenate(plain))
+    )
+
+
+def _sizes(off: Float[np.ndarray, "push output"]) -> Float[np.ndarray, "push body 2"]:
+    """Return the sizes of errors of position and of rotation."""
+    off = off.reshape(len(off), -1, RESIDUALS)
+    return np.stack([np.hypot(off[..., 0], off[..., 1]), np.abs(off[..., 2])], axis=-1)
+
+
+def quantile(scores: Float[np.ndarray, "push body 2"]) -> Float[np.ndarray, "body 2"]:
+    """Return the conformal quantile: with `LEVEL`, the score of a new push is below."""
+    count = len(scores)
+    rank = min(count, int(np.ceil(LEVEL * (count + 1))))
+    return np.sort(scores, axis=0)[rank - 1]

@@ -1,0 +1,210 @@
+"""A Gaussian process on what an engine gets wrong by the end of a push.
+
+Each residual (along and across the push, and in angle, of each body) is a Gaussian
+process of the start of the push: Matern 3/2, one length scale for each input, noise.
+It grows in proportion to the way of the pusher, so that it has a value at every step.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+from tinygp import kernels, transforms
+from tinygp.kernels.distance import L2Distance
+
+from sainet.models.correctors import (
+    AbstractCorrector,
+    Prediction,
+    Purpose,
+    Region,
+    Start,
+)
+from sainet.scenes.controls import Controls
+from sainet.scenes.geometry import direction, norm, rotate, unit, wrap_angle
+from sainet.scenes.scene import Scene
+from sainet.scenes.state import State, Trajectory
+
+BODIES = 2  # at most
+RESIDUALS = 3  # of a body: along the push (m), across it (m), angle (rad)
+_SMALLEST = 1e-6  # m, a shorter way of the pusher has no direction
+_MATERN = kernels.Matern32(distance=L2Distance())
+
+
+class Inputs(eqx.Module):
+    """What a process takes from the start of a push, by name."""
+
+    names: tuple[str, ...] = eqx.field(static=True)
+
+    def of(
+        self, scene: Scene, start: Start, heading: Float[Array, " push"]
+    ) -> Float[Array, "push input"]:
+        """Return the inputs of each push.
+
+        Args:
+            scene: of each push.
+            start: of each push; `first` is the state at which it began.
+            heading: of the pusher on the table (rad).
+        """
+        assert start.first is not None
+        known = known_inputs(scene, start.first, start.frame.pushed, heading)
+        return jnp.stack([known[name] for name in self.names], axis=-1)
+
+
+def known_inputs(
+    scene: Scene,
+    state: State,
+    pushed: Float[Array, "push body"],
+    heading: Float[Array, " push"],
+) -> dict[str, Float[Array, " push"]]:
+    """Return everything that can be an input, by name.
+
+    Args:
+        scene: of each push, of one or two bodies.
+        state: at the start of each push.
+        pushed: 1 for the pushed disk, 0 for the other.
+        heading: of the pusher on the table (rad).
+    """
+    place = jnp.sum(pushed[..., None] * state.position, axis=-2)
+    turned = jnp.sum(pushed * state.angle, axis=-1)
+    normal = direction(place - state.pusher_position)
+    found = {
+        "contact_angle": wrap_angle(heading - normal),
+        **_vector("normal_on_disk", unit(normal - turned)),
+        **_vector("place", place),
+        **_vector("normal_on_table", unit(normal)),
+        **_vector("disk_on_table", unit(turned)),
+    }
+    for body in range(scene.body_count):
+        found[f"mass_{body}"] = scene.mass[..., body]
+        found[f"radius_{body}"] = scene.radius[..., body]
+    if scene.body_count > 1:
+        other = jnp.sum((1 - pushed)[..., None] * state.position, axis=-2)
+        line = rotate(other - place, -heading)
+        found |= {"bearing": direction(line), "distance": norm(line)}
+    return found
+
+
+def _vector(name: str, value: Float[Array, "push 2"]) -> dict[str, Array]:
+    return {f"{name}_x": value[..., 0], f"{name}_y": value[..., 1]}
+
+
+class Process(eqx.Module):
+    """Gaussian processes of the same inputs, one for each output, given pushes.
+
+    Inputs are standardised. So are outputs: `mean` and `scale` are in metres or radians
+    for each metre of the pusher's way.
+    """
+
+    inputs: Float[Array, "push input"]  # of the pushes that it was fitted to
+    amplitude: Float[Array, " output"]
+    length: Float[Array, "output input"]  # scale of each input
+    noise: Float[Array, " output"]  # variance
+    weights: Float[Array, "output push"]  # the inverse covariance times the outputs
+    whitening: Float[Array, "output push push"]  # inverse Cholesky factor of it
+    mean: Float[Array, " output"]
+    scale: Float[Array, " output"]
+
+    def __call__(
+        self, inputs: Float[Array, "push input"]
+    ) -> tuple[Float[Array, "push output"], Float[Array, "push output"]]:
+        """Return the mean and the standard deviation of each output, with its noise."""
+        means, deviations = [], []
+        for output in range(self.mean.shape[0]):
+            kernel = kernel_of(self.amplitude[output], self.length[output])
+            across = kernel(self.inputs, inputs)  # [fitted, push]
+            known = jnp.sum((self.whitening[output] @ across) ** 2, axis=0)
+            left = self.amplitude[output] ** 2 - known
+            means.append(self.weights[output] @ across)
+            deviations.append(jnp.sqrt(jnp.maximum(left, 0.0) + self.noise[output]))
+        mean, deviation = jnp.stack(means, -1), jnp.stack(deviations, -1)
+        return self.mean + self.scale * mean, self.scale * deviation
+
+
+def kernel_of(
+    amplitude: Float[Array, ""], length: Float[Array, " input"]
+) -> kernels.Kernel:
+    """Return the covariance function of one output."""
+    return amplitude**2 * transforms.Linear(1 / length, _MATERN)
+
+
+class ResidualProcess(AbstractCorrector):
+    """Adds the residual that a Gaussian process expects to a simulator prediction."""
+
+    process: Process
+    centre: Float[Array, " input"]
+    width: Float[Array, " input"]  # inputs are centred, then divided by it
+    # Of 90 % regions of position and rotation: factors of the standard deviations, and
+    # sizes that are the same for all pushes (m, rad, for each metre of way).
+    reach: Float[Array, "body 2"]
+    plain: Float[Array, "body 2"]
+    inputs: Inputs
+    time_step: float = eqx.field(static=True)
+
+    @property
+    def made_for(self) -> Purpose:
+        """Pushes along paths."""
+        return Purpose("robot", self.time_step)
+
+    def correct(
+        self,
+        scene: Scene,
+        start: Start,
+        controls: Controls,
+        simulated: Trajectory | None,
+    ) -> Prediction:
+        """Add the expected residual, in proportion to the pusher's way so far."""
+        assert simulated is not None
+        assert start.simulated is not None
+        states, before = simulated.states, start.predicted
+        way, heading = way_of(controls, before)
+        rate = self._rates(scene, start, heading)[0]
+        moved = rate[:, None] * jnp.cumsum(way, axis=1)[..., None, None]
+        speed = rate[:, None] * (way / scene.time_step)[..., None, None]
+        turn = heading[:, None, None]
+        already = before.position - start.simulated.position
+        turned = before.angle - start.simulated.angle
+        corrected = State(
+            position=states.position + already[:, None] + rotate(moved[..., :2], turn),
+            angle=states.angle + turned[:, None] + moved[..., 2],
+            velocity=states.velocity + rotate(speed[..., :2], turn),
+            spin=states.spin + speed[..., 2],
+            pusher_position=states.pusher_position,
+            pusher_velocity=states.pusher_velocity,
+        )
+        return Prediction(Trajectory(corrected))
+
+    def region(self, scene: Scene, start: Start, controls: Controls) -> Region:
+        """Return the regions about the predicted ends of pushes."""
+        way, heading = way_of(controls, start.predicted)
+        whole = way.sum(axis=1)[:, None, None]
+        grown = self._rates(scene, start, heading)[1] * whole
+        return Region(
+            heading=heading,
+            axes=self.reach[:, :1] * grown[..., :2],
+            turn=self.reach[:, 1] * grown[..., 2],
+            plain=self.plain * whole,
+        )
+
+    def rates(
+        self, inputs: Float[Array, "push input"]
+    ) -> tuple[Float[Array, "push output"], Float[Array, "push output"]]:
+        """Return mean and deviation of residuals for each metre of way (m, m, rad)."""
+        return self.process((inputs - self.centre) / self.width)
+
+    def _rates(
+        self, scene: Scene, start: Start, heading: Float[Array, " push"]
+    ) -> tuple[Float[Array, "push body 3"], Float[Array, "push body 3"]]:
+        mean, deviation = self.rates(self.inputs.of(scene, start, heading))
+        shape = (-1, scene.body_count, RESIDUALS)
+        return mean.reshape(shape), deviation.reshape(shape)
+
+
+def way_of(
+    controls: Controls, start: State
+) -> tuple[Float[Array, "push time"], Float[Array, " push"]]:
+    """Return the pusher's way in each step (m), and its heading on the table (rad)."""
+    path = controls.command
+    whole = jnp.concatenate([start.pusher_position[:, None], path], axis=1)
+    straight = path[:, -1] - start.pusher_position
+    is_still = norm(straight) < _SMALLEST
+    ahead = jnp.where(is_still[:, None], jnp.array([1.0, 0.0]), straight)
+    return norm(whole[:, 1:] - whole[:, :-1]), direction(ahead)

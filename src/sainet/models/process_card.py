@@ -1,0 +1,193 @@
+"""Gaussian processes on disk: their card, and their arrays in a file of their own."""
+
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import msgspec
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import cho_solve, cholesky, solve_triangular
+
+from sainet.engines.simulator import InternalEngine
+from sainet.models.card import Count
+from sainet.models.checkpoint import load_arrays
+from sainet.models.correctors.process import (
+    BODIES,
+    RESIDUALS,
+    Inputs,
+    Process,
+    ResidualProcess,
+    kernel_of,
+)
+from sainet.models.identity import ModelId, ProcessFeatures
+from sainet.runs.documents import content_hash, read_document, read_file
+from sainet.runs.errors import BadCheckpoint
+from sainet.runs.manifest import Manifest
+from sainet.scenes.quantities import TimeStep
+from sainet.scenes.recording import AGREES, CameraOffset
+
+PROCESS = "process.json"
+ARRAYS = "process.safetensors"
+MOST = 5000  # pushes of one process: its covariance is a dense matrix
+Name = Annotated[str, msgspec.Meta(pattern=r"\A[a-z_0-9]{1,40}\Z")]
+
+
+class ProcessSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """How a process was fitted."""
+
+    features: ProcessFeatures = "side"
+    iterations: Count = 80  # of the optimiser, at most, for each output
+    seed: Annotated[int, msgspec.Meta(ge=0)] = 0
+    folds: Annotated[int, msgspec.Meta(ge=2)] = 5  # that calibrate its uncertainty
+
+
+class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
+    """Metadata that restricts a process's use; fields of `Card` mean the same."""
+
+    identity: ModelId
+    kind: Literal["robot"]
+    time_step: TimeStep  # s
+    truth_engine: str
+    camera: CameraOffset = AGREES
+    data: str
+    disks: Annotated[int, msgspec.Meta(ge=1, le=BODIES)]
+    trained_pushes: Annotated[int, msgspec.Meta(ge=1, le=MOST)]
+    data_seeds: tuple[int, ...] = ()
+    pushes: str = ""
+    weights: str  # hash of the arrays' file
+    inputs: Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, max_length=20)]
+    recipe: ProcessSettings
+    manifest: Manifest
+    final_loss: float  # negative log likelihood for each push and output
+    format_version: Literal[1] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse identities that no process can have."""
+        if self.identity.kind != "gp" or self.identity.simulator is None:
+            raise ValueError("identity is not that of a Gaussian process")
+
+    @property
+    def has_single_steps(self) -> bool:
+        """False: a process predicts whole pushes."""
+        return False
+
+    @property
+    def internal(self) -> InternalEngine | None:
+        """The internal engine."""
+        simulator = self.identity.simulator
+        return None if simulator is None else InternalEngine(simulator, self.camera)
+
+
+class Fitted(NamedTuple):
+    """The arrays of a process, in double precision; `Process` has their meanings."""
+
+    inputs: Float[np.ndarray, "push input"]  # standardised
+    outputs: Float[np.ndarray, "output push"]  # standardised
+    amplitude: Float[np.ndarray, " output"]
+    length: Float[np.ndarray, "output input"]
+    noise: Float[np.ndarray, " output"]
+    mean: Float[np.ndarray, " output"]
+    scale: Float[np.ndarray, " output"]
+    centre: Float[np.ndarray, " input"]
+    width: Float[np.ndarray, " input"]
+    reach: Float[np.ndarray, "body 2"]
+    plain: Float[np.ndarray, "body 2"]
+
+
+def corrector_of(
+    fitted: Fitted, inputs: tuple[str, ...], time_step: float
+) -> ResidualProcess:
+    """Return the process given its pushes, solved in double precision."""
+    weights, whitening = [], []
+    for output, values in enumerate(fitted.outputs):
+        covariance = covariance_of(fitted, output)
+        factor = cholesky(covariance, lower=True)
+        weights.append(cho_solve((factor, True), values))
+        unit = np.eye(len(values))
+        whitening.append(solve_triangular(factor, unit, lower=True))
+
+    def single(value: np.ndarray) -> jax.Array:
+        return jnp.asarray(value, jnp.float32)
+
+    process = Process(
+        inputs=single(fitted.inputs),
+        amplitude=single(fitted.amplitude),
+        length=single(fitted.length),
+        noise=single(fitted.noise),
+        weights=single(np.stack(weights)),
+        whitening=single(np.stack(whitening)),
+        mean=single(fitted.mean),
+        scale=single(fitted.scale),
+    )
+    return ResidualProcess(
+        process,
+        centre=single(fitted.centre),
+        width=single(fitted.width),
+        reach=single(fitted.reach),
+        plain=single(fitted.plain),
+        inputs=Inputs(inputs),
+        time_step=time_step,
+    )
+
+
+def covariance_of(fitted: Fitted, output: int) -> Float[np.ndarray, "push push"]:
+    """Return the covariance of an output at its pushes, noise included."""
+    with jax.enable_x64(True):
+        kernel = kernel_of(
+            jnp.asarray(fitted.amplitude[output]), jnp.asarray(fitted.length[output])
+        )
+        points = jnp.asarray(fitted.inputs)
+        covariance = np.asarray(kernel(points, points))
+    return covariance + fitted.noise[output] * np.eye(len(points))
+
+
+def is_process(folder: Path) -> bool:
+    """Return whether a folder holds a finished Gaussian process."""
+    return (folder / PROCESS).is_file()
+
+
+def load_process(folder: Path) -> tuple[ResidualProcess, ProcessCard]:
+    """Read a Gaussian process and its card.
+
+    Raises:
+        BadCheckpoint: damaged, of another format, or the two do not fit.
+    """
+    card = read_document(
+        folder / PROCESS, ProcessCard, error=BadCheckpoint, remedy="fit it again"
+    )
+    pushes, inputs = card.trained_pushes, len(card.inputs)
+    outputs = RESIDUALS * card.disks
+    like = Fitted(
+        inputs=np.empty((pushes, inputs)),
+        outputs=np.empty((outputs, pushes)),
+        amplitude=np.empty(outputs),
+        length=np.empty((outputs, inputs)),
+        noise=np.empty(outputs),
+        mean=np.empty(outputs),
+        scale=np.empty(outputs),
+        centre=np.empty(inputs),
+        width=np.empty(inputs),
+        reach=np.empty((card.disks, 2)),
+        plain=np.empty((card.disks, 2)),
+    )
+    with jax.enable_x64(True):
+        arrays = load_arrays(folder / ARRAYS, like)
+    fitted = Fitted(*map(np.asarray, arrays))
+    found = content_hash(read_file(folder / ARRAYS, error=BadCheckpoint))
+    if found != card.weights or not _is_possible(fitted):
+        raise BadCheckpoint(
+            f"{folder / PROCESS}: weights is another hash than that of {ARRAYS}; the "
+            "two do not belong together, fit the process again."
+        )
+    return corrector_of(fitted, card.inputs, card.time_step), card
+
+
+def _is_possible(fitted: Fitted) -> bool:
+    """Return whether everything that must be positive is."""
+    positive = (fitted.amplitude, fitted.length, fitted.noise, fitted.scale)
+    return all(
+        (each > 0).all()
+        for each in (*positive, fitted.width, fitted.reach, fitted.plain)
+    )
