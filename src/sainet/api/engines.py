@@ -176,7 +176,8 @@ def from_step(step: Step, *, name: str, numpy: bool = False, version: int = 1) -
         BadInput: the name has other characters.
     """
     spec = checked(OwnSpec(name=name, version=version), "engine")
-    return own_model((HostStepEngine if numpy else StepEngine)(step, name), spec)
+    kind = HostStepEngine if numpy else StepEngine
+    return own_model(kind(step=step, name=name), spec)
 
 
 def own_model(engine: AbstractPathEngine, spec: OwnSpec) -> Model:
