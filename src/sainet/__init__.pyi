@@ -9,6 +9,7 @@ from sainet.api.evaluating import evaluate as evaluate
 from sainet.api.functions import from_function as from_function
 from sainet.api.learning import identify as identify
 from sainet.api.learning import tune as tune
+from sainet.api.mjcf import from_mjcf as from_mjcf
 from sainet.api.models import load as load
 from sainet.api.predictions import from_predictions as from_predictions
 from sainet.api.pushes import Pushes as Pushes

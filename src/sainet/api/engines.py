@@ -26,10 +26,9 @@ Step = Callable[[Scene, State], State]
 _DISKS = ("position", "angle", "velocity", "spin")
 
 
-class AbstractStepEngine(AbstractEngine):
-    """An engine that repeats a step function; the pusher follows its path."""
+class AbstractPathEngine(AbstractEngine):
+    """An engine of a user's own; the pusher follows its path."""
 
-    step: eqx.AbstractVar[Step]
     name: eqx.AbstractVar[str]
 
     @abstractmethod
@@ -40,8 +39,8 @@ class AbstractStepEngine(AbstractEngine):
         """Return the states after each step of the controls.
 
         Raises:
-            BadInput: a force drives the pusher, or the step function returns arrays of
-                another shape.
+            BadInput: a force drives the pusher, or the engine does not accept the
+                scene.
         """
         if controls.pusher_path is None:
             raise BadInput(
@@ -59,6 +58,12 @@ class AbstractStepEngine(AbstractEngine):
             jax.tree.map(lambda x: x.reshape(*shape, *x.shape[1:]), found)
         )
 
+
+class AbstractStepEngine(AbstractPathEngine):
+    """An engine that repeats a step function."""
+
+    step: eqx.AbstractVar[Step]
+
     def after(self, scene: Scene, state: State, path: Any) -> State:  # noqa: ANN401
         """Return the state one step later.
 
@@ -66,6 +71,9 @@ class AbstractStepEngine(AbstractEngine):
             scene: of each push.
             state: of each push, before the step.
             path: position of the pusher at the end of the step, [push, 2] (m).
+
+        Raises:
+            BadInput: the step function returns arrays of another shape.
         """
         velocity = (path - state.pusher_position) / scene.time_step
         driven = eqx.tree_at(lambda s: s.pusher_velocity, state, velocity)
@@ -168,6 +176,12 @@ def from_step(step: Step, *, name: str, numpy: bool = False, version: int = 1) -
         BadInput: the name has other characters.
     """
     spec = checked(OwnSpec(name=name, version=version), "engine")
-    OWN[name] = (HostStepEngine if numpy else StepEngine)(step, name)
-    identity = ModelId(kind="physics", simulator=spec, name=name)
+    kind = HostStepEngine if numpy else StepEngine
+    return own_model(kind(step=step, name=name), spec)
+
+
+def own_model(engine: AbstractPathEngine, spec: OwnSpec) -> Model:
+    """Register an engine, and return the model that simulates with it."""
+    OWN[spec.name] = engine
+    identity = ModelId(kind="physics", simulator=spec, name=spec.name)
     return Model(identity, PhysicsDynamics(spec.build()), internal=InternalEngine(spec))

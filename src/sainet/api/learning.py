@@ -33,9 +33,10 @@ def identify(
 
     Args:
         pushes: along paths, observed at least at their ends.
-        engine: the planar engine, or one of your own in JAX (`from_step`): of that,
-            frictions and camera offset are estimated, as far as its step depends on
-            the frictions of the scene. Engines outside JAX have no derivatives.
+        engine: the planar engine, or one of your own in JAX (`from_step`) or from an
+            MJCF file (`from_mjcf`): of that, frictions and camera offset are
+            estimated, as far as its step depends on the frictions of the scene. Step
+            functions outside JAX have no derivatives.
         out: run folder to write, which commands take as a model; None: no files.
         progress: show a progress bar; None: on a terminal.
 

@@ -140,7 +140,7 @@ class OwnSpec(_Spec, frozen=True, kw_only=True, tag="own"):
         if self.name not in OWN:
             raise UnknownName(
                 f"No engine named '{self.name}' was made in this process; call "
-                f"`from_step` with name='{self.name}' first."
+                f"`from_step` with name='{self.name}' first, or `from_mjcf`."
             )
         return AssumedProperties(OWN[self.name], self.assumptions)
 
