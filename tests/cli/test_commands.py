@@ -280,6 +280,25 @@ def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
     assert "no group 'ice'; it has none" in error
 
 
+def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
+    out = tmp_path / "gp"
+    words = ("tune", "gp", "--data", pushes, "--engine", "planar", "--out", out)
+    done = sainet(*words, "--iterations", 2, "--quiet", "--json")
+    assert json.loads(done.stdout.splitlines()[-1])["model"] == "gp"
+    error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr
+    assert "trained on" in error
+    given = ("--model", "physics", out, "--data", pushes, "--force", "--json")
+    done = sainet("evaluate", *given)
+    assert "its 90 % regions hold" in done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])["coverage"]
+    assert {each["model"] for each in found} == {"gp"}
+    error = sainet(*words, "--hold", 3, status=2).stderr
+    assert "--hold is 3; it must be left out: it is a setting of networks" in error
+    words = ("tune", "sain", "--data", pushes, "--out", tmp_path / "net")
+    error = sainet(*words, "--features", "side", status=2).stderr
+    assert "--features is side; it must be paper or place for a network" in error
+
+
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):
     out = tmp_path / "net"
     shutil.copytree(SOURCE / "models" / "pretrained" / "in", out)

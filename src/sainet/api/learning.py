@@ -4,19 +4,24 @@ from contextlib import AbstractContextManager, nullcontext
 from os import PathLike, fspath
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any, Literal, cast
 
 from sainet.api.models import Loadable, load
 from sainet.api.progress import shown_progress
 from sainet.api.pushes import Dataset, store_of
+from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.identification.identify import identify as estimate
 from sainet.identification.identify import identify_into
 from sainet.learning.fit import fit
 from sainet.learning.log import reported
+from sainet.learning.process import fit_process, fits_of
 from sainet.learning.recipes import FROM_ENGINE, Recipe, recipe_for, start_named
-from sainet.models.identity import ModelKind
+from sainet.models.identity import ModelKind, ProcessFeatures
 from sainet.models.library import find_internal_engine, identified_physics
 from sainet.models.model import Model
+from sainet.models.process_card import ProcessSettings
+from sainet.runs.documents import checked
 from sainet.runs.errors import BadInput
 
 Folder = PathLike[str] | str
@@ -64,10 +69,11 @@ def identify(
 
 
 def tune(
-    model: ModelKind,
+    model: ModelKind | Literal["gp"],
     pushes: Dataset,
     *,
-    engine: Loadable = "planar",
+    engine: Loadable | None = None,
+    features: ProcessFeatures | None = None,
     start: Folder | Model = FROM_ENGINE,
     recipe: Recipe | None = None,
     iterations: int | None = None,
@@ -75,20 +81,26 @@ def tune(
     out: Folder | None = None,
     progress: bool | None = None,
 ) -> Model:
-    """Train a network on few pushes, around an engine or from an existing network.
+    """Train a network, or fit a Gaussian process, on few pushes.
 
     Args:
-        model: `sain`, a network around an engine, or `in`, a network without one.
+        model: `sain`, a network around an engine, or `in`, a network without one; or
+            `gp`, a Gaussian process around an engine, for pushes of one or two disks.
         pushes: to train on.
-        engine: internal engine of SAIN: identified physics, a simulator whose
-            prediction the dataset contains, or a folder of identified parameters.
-        start: `engine` starts as the internal engine, with a network that adds nothing
-            to its motion at first; otherwise a network to train further: shipped, its
-            folder, or a model with a folder.
+        engine: internal engine: identified physics, a simulator whose prediction the
+            dataset contains, or a folder of identified parameters. None: `planar` for
+            SAIN; `gp` identifies the engine on the same pushes.
+        features: inputs of a Gaussian process, each with those before: `angle` (of the
+            contact), `side` (of the disk), `place` (on the table). None: `side`. For
+            a network give `recipe` other features.
+        start: of a network. `engine` starts as the internal engine, with a network that
+            adds nothing to its motion at first; otherwise a network to train further:
+            shipped, its folder, or a model with a folder.
         recipe: settings of training, for example
             ``recipe_for(FromSimulator()).changed(l2=0.01)``; with a start of its own.
             None: the recipe that fits `start`.
-        iterations: gradient steps; None: those of the recipe.
+        iterations: gradient steps, or iterations of the fit of a process; None: the
+            usual number.
         seed: of everything random; None: that of the recipe.
         out: run folder, with the network and the log of its training; an identical
             call resumes. None: a temporary folder, deleted at the end.
@@ -101,6 +113,16 @@ def tune(
         Diverged: the loss became NaN or infinite.
     """
     given = {"iterations": iterations, "seed": seed}
+    if model == "gp":
+        if recipe is not None or start != FROM_ENGINE:
+            raise BadInput("`recipe` and `start` are of networks; leave them out.")
+        chosen = {
+            k: v for k, v in {**given, "features": features}.items() if v is not None
+        }
+        settings = checked(ProcessSettings(**cast(Any, chosen)), "gp")
+        return _fitted(store_of(pushes), settings, engine, out, progress)
+    if features is not None:
+        raise BadInput("`features` is of `gp`; give `recipe` those of a network.")
     begun = recipe_for(start_named(_start_name(start))) if recipe is None else recipe
     settings = begun.changed(**{k: v for k, v in given.items() if v is not None})
     total = settings.optimiser.iterations
@@ -111,8 +133,33 @@ def tune(
                 store_of(pushes),
                 settings,
                 Path(folder),
-                assumed_engine=_internal(engine),
+                assumed_engine=_internal(engine or "planar"),
                 on_step=reported(advance),
+            )
+        found = load(folder)
+    return found if out is not None else found.without_folder()
+
+
+def _fitted(
+    store: Store,
+    settings: ProcessSettings,
+    engine: Loadable | None,
+    out: Folder | None,
+    progress: bool | None,
+) -> Model:
+    def identified(folder: Path) -> InternalEngine:
+        return identify_into(store, folder).engine
+
+    internal = identified if engine is None else _internal(engine)
+    title = f"Fitting to {store.info.pushes} pushes"
+    with _folder(out) as folder:
+        with shown_progress(title, fits_of(store, settings), progress) as advance:
+            fit_process(
+                store,
+                Path(folder),
+                internal,
+                settings,
+                on_output=lambda: advance(1, ""),
             )
         found = load(folder)
     return found if out is not None else found.without_folder()

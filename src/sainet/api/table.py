@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 from msgspec.structs import astuple
 
 from sainet.evaluation.claims import TRUE_PROPERTIES, places
+from sainet.evaluation.coverage import Coverage, coverage_of
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.summary import BASELINE, Row, Summary, summarise
-from sainet.models.identity import NETWORKS
+from sainet.models.identity import LEARNED
 from sainet.report import WRITERS
 from sainet.report.arrange import arrange
 from sainet.report.pages.page import Report, write_report
@@ -60,6 +61,11 @@ class ErrorTable:
         found = (*self.summary.rows, *self.summary.predictions)
         return [{**_names(row), **_errors(row)} for row in found]
 
+    @property
+    def coverage(self) -> list[Coverage]:
+        """Whether the 90 % regions of Gaussian processes hold the ends of pushes."""
+        return coverage_of(self.measured)
+
     def verdict(self) -> str:
         """Return in sentences which model errs less, clearly or not.
 
@@ -73,7 +79,7 @@ class ErrorTable:
     def _beside_others(self) -> Iterator[str]:
         """Yield in which errors networks are better or worse than other models."""
         summary = self.summary
-        networks = [each.slug for each in summary.models if each.kind in NETWORKS]
+        networks = [each.slug for each in summary.models if each.kind in LEARNED]
         others = [
             each.slug
             for each in summary.models

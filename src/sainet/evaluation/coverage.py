@@ -90,6 +90,49 @@ def coverage_of(measured: Measurements) -> list[Coverage]:
     ]
 
 
+HEADINGS = (
+    *("pushes", "model", "of", "disk", "n", "inside (%)", "half width"),
+    *("interval score", "score over regions of one size"),
+)
+
+
+def cells(found: Coverage) -> list[str]:
+    """Return the cells of a table of coverage, below `HEADINGS`."""
+    unit = "°" if found.kind == "rot" else " mm"
+    ends = [found.inside, found.size, found.score, found.over_plain]
+    digits = [1, 2, 2, 2]
+    numbers = [
+        "–"  # noqa: RUF001
+        if None in msgspec.structs.astuple(each)
+        else f"{each.value:.{n}f} [{each.low:.{n}f}, {each.high:.{n}f}]"
+        for each, n in zip(ends, digits, strict=True)
+    ]
+    numbers[1], numbers[2] = numbers[1] + unit, numbers[2] + unit
+    what = "position" if found.kind == "pos" else "rotation"
+    words = [found.condition, f"`{found.model}`", what]
+    return [*words, str(found.body), str(found.count), *numbers]
+
+
+def in_words(found: Sequence[Coverage]) -> list[str]:
+    """Return a sentence for each coverage."""
+    return [_sentence(each) for each in found]
+
+
+def _sentence(found: Coverage) -> str:
+    where = f"{found.condition}: " if found.condition else ""
+    what = "final positions" if found.kind == "pos" else "final rotations"
+    inside, size, over = found.inside, found.size, found.over_plain
+    numbers = (*msgspec.structs.astuple(inside), size.value)
+    if None in numbers or over.value is None:
+        return f"{where}{found.model}: too few pushes to judge its 90 % regions"
+    return (
+        f"{where}{found.model}: its 90 % regions hold {inside.value:.0f} % "
+        f"[{inside.low:.0f}, {inside.high:.0f}] of the {what} of disk {found.body}; "
+        f"half width {size.value:.2f} {UNITS[found.kind]}; interval score "
+        f"{over.value:.2f} of that of regions of one size"
+    )
+
+
 def _coverage(
     measured: Measurements, condition: Condition, slug: str, kind: str
 ) -> Sequence[Coverage]:

@@ -17,6 +17,7 @@ ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
 Variant = Literal["", "bystander", "single-steps", "for-all"]
 
 NETWORKS = get_args(ModelKind)
+LEARNED = (*NETWORKS, "gp")
 _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
 _VARIANTS = {"single-steps": "single steps", "for-all": "all surfaces"}
 

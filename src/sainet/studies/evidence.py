@@ -4,7 +4,7 @@ from pathlib import Path
 
 import msgspec
 
-from sainet.evaluation.measurements import read_measurements
+from sainet.evaluation.measurements import Measurements, read_measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import IDENTIFIED, Identified, read_identified
 from sainet.runs import documents
@@ -47,12 +47,16 @@ class Evidence:
             measured = self.folder / f"{name}.nc.xz"
             summary = load_study(name).summarise if name in STUDIES else summarise
             self._summaries[name] = (
-                summary(read_measurements(measured))
+                summary(self.measured(name))
                 if measured.is_file()
                 # Of version 0.1.0, until the study is measured again.
                 else documents.read_document(self.folder / f"{name}.json", Summary)
             )
         return self._summaries[name]
+
+    def measured(self, name: str) -> Measurements:
+        """Return the measurements of a study."""
+        return read_measurements(self.folder / f"{name}.nc.xz")
 
     def benchmark(self, case: str) -> Benchmark:
         """Return the figures of a benchmark case."""

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, cast
 import jinja2
 
 from sainet.evaluation.claims import places
+from sainet.evaluation.coverage import HEADINGS, cells, coverage_of
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
 from sainet.report.palette import labels_of
@@ -57,6 +58,9 @@ def helpers(evidence: Evidence) -> dict[str, object]:
     summary = evidence.summary
     return {
         "summary": summary,
+        "coverage": lambda name: _table(
+            HEADINGS, map(cells, coverage_of(evidence.measured(name))), align=":--"
+        ),
         "table": lambda name: to_markdown(arrange(summary(name))),
         "origin": lambda name: origin(summary(name)),
         "claims": lambda name: "\n\n".join(

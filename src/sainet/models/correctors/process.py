@@ -116,7 +116,7 @@ class Process(eqx.Module):
             means.append(self.weights[output] @ across)
             deviations.append(jnp.sqrt(jnp.maximum(left, 0.0) + self.noise[output]))
         mean, deviation = jnp.stack(means, -1), jnp.stack(deviations, -1)
-        return self.mean + self.scale * mean, self.scale * deviation
+        return self.mean[None] + self.scale[None] * mean, self.scale[None] * deviation
 
 
 def kernel_of(
@@ -179,16 +179,16 @@ class ResidualProcess(AbstractCorrector):
         grown = self._rates(scene, start, heading)[1] * whole
         return Region(
             heading=heading,
-            axes=self.reach[:, :1] * grown[..., :2],
-            turn=self.reach[:, 1] * grown[..., 2],
-            plain=self.plain * whole,
+            axes=self.reach[None, :, :1] * grown[..., :2],
+            turn=self.reach[None, :, 1] * grown[..., 2],
+            plain=self.plain[None] * whole,
         )
 
     def rates(
         self, inputs: Float[Array, "push input"]
     ) -> tuple[Float[Array, "push output"], Float[Array, "push output"]]:
         """Return mean and deviation of residuals for each metre of way (m, m, rad)."""
-        return self.process((inputs - self.centre) / self.width)
+        return self.process((inputs - self.centre[None]) / self.width[None])
 
     def _rates(
         self, scene: Scene, start: Start, heading: Float[Array, " push"]
@@ -206,5 +206,5 @@ def way_of(
     whole = jnp.concatenate([start.pusher_position[:, None], path], axis=1)
     straight = path[:, -1] - start.pusher_position
     is_still = norm(straight) < _SMALLEST
-    ahead = jnp.where(is_still[:, None], jnp.array([1.0, 0.0]), straight)
+    ahead = jnp.where(is_still[:, None], jnp.array([[1.0, 0.0]]), straight)
     return norm(whole[:, 1:] - whole[:, :-1]), direction(ahead)

@@ -1,0 +1,328 @@
+"""Gaussian processes around an engine: predictions, regions, files and refusals."""
+
+import json
+from dataclasses import replace
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import sainet as sn
+from learning.stores import info_of, made_up
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate
+from sainet.datasets.store import open_store
+from sainet.datasets.writer import write_store
+from sainet.engines.simulator import SIMULATORS, InternalEngine
+from sainet.evaluation.coverage import MISSED, coverage_of, measured
+from sainet.evaluation.evaluate import evaluate
+from sainet.learning.process import LEVEL, ends_of, fit_process, quantile
+from sainet.models.correctors import Region
+from sainet.models.library import load_model
+from sainet.models.process_card import (
+    ARRAYS,
+    PROCESS,
+    Fitted,
+    ProcessSettings,
+    corrector_of,
+)
+from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
+from sainet.scenes.controls import PathControls
+from sainet.scenes.geometry import rotate
+from sainet.scenes.state import pack_motion
+from sainet.tasks.push_to_goal import PushToGoal
+
+PUSHES = GenerateConfig(
+    pushes=60, stroke_mm=(3.0,), hold_steps=30, noise_level="none", seed=9
+)
+PLANAR = InternalEngine(SIMULATORS["planar"])
+QUICK = ProcessSettings(features="angle", iterations=20, folds=3)
+TRAINED = 45
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return generate(PUSHES, tmp_path_factory.mktemp("process") / "pushes")
+
+
+@pytest.fixture(scope="module")
+def folder(store, tmp_path_factory):
+    """A process of the first pushes, around the engine with assumed properties."""
+    out = tmp_path_factory.mktemp("fitted") / "gp"
+    fit_process(store.first(TRAINED), out, PLANAR, QUICK)
+    return out
+
+
+@pytest.fixture(scope="module")
+def model(folder):
+    return load_model(str(folder))
+
+
+@pytest.fixture(scope="module")
+def tests(store):
+    return store.take(range(TRAINED, PUSHES.pushes))
+
+
+def pushes_of(store):
+    batch = sn.open_pushes(store.path).batch()
+    take = lambda x: x[TRAINED:]  # noqa: E731
+    return jax.tree.map(take, (batch.scene, batch.initial, batch.controls))
+
+
+def naive_posterior(fitted, output, at):
+    """Mean and variance of one output by the textbook, element by element."""
+
+    def covariance(x, y):
+        r = np.sqrt(3) * np.linalg.norm((x - y) / fitted.length[output])
+        return fitted.amplitude[output] ** 2 * (1 + r) * np.exp(-r)
+
+    points = fitted.inputs
+    k = np.array([[covariance(x, y) for y in points] for x in points])
+    k += fitted.noise[output] * np.eye(len(points))
+    across = np.array([covariance(at, x) for x in points])
+    mean = across @ np.linalg.solve(k, fitted.outputs[output])
+    left = covariance(at, at) - across @ np.linalg.solve(k, across)
+    return mean, left + fitted.noise[output]
+
+
+def test_mean_and_deviation_are_those_of_the_textbook():
+    rng = np.random.default_rng(0)
+    fitted = Fitted(
+        inputs=rng.normal(size=(12, 2)),
+        outputs=rng.normal(size=(3, 12)),
+        amplitude=np.array([1.0, 0.5, 2.0]),
+        length=rng.uniform(0.5, 2, (3, 2)),
+        noise=np.array([0.1, 0.2, 0.3]),
+        mean=np.array([0.1, 0.2, 0.3]),
+        scale=np.array([1.0, 2.0, 3.0]),
+        centre=np.array([0.5, -0.5]),
+        width=np.array([2.0, 3.0]),
+        reach=np.ones((1, 2)),
+        plain=np.ones((1, 2)),
+    )
+    process = corrector_of(fitted, ("contact_angle", "place_x"), 1 / 240)
+    raw = rng.normal(size=(5, 2))
+    mean, deviation = process.rates(jnp.asarray(raw, jnp.float32))
+    for push, at in enumerate((raw - fitted.centre) / fitted.width):
+        for output in range(3):
+            known = naive_posterior(fitted, output, at)
+            expected = fitted.mean[output] + fitted.scale[output] * known[0]
+            np.testing.assert_allclose(mean[push, output], expected, atol=1e-4)
+            wide = fitted.scale[output] * np.sqrt(known[1])
+            np.testing.assert_allclose(deviation[push, output], wide, rtol=1e-4)
+
+
+def test_a_process_errs_less_than_the_engine_that_it_corrects(model, tests):
+    found = evaluate([load_model("physics"), model], tests)
+    error = found.data["final_pos_mm"].values[:, 0].mean(axis=0)  # [push, body]
+    physics, process = found.data["final_pos_mm"].values[:, 0].mean(axis=1)
+    assert (process < 0.8 * physics).all(), error
+
+
+def test_equal_settings_make_equal_bytes(store, folder, tmp_path):
+    fit_process(store.first(TRAINED), tmp_path / "gp", PLANAR, QUICK)
+    for name in (PROCESS, ARRAYS):
+        assert (tmp_path / "gp" / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_a_finished_process_is_not_fitted_again(store, folder):
+    def fail():
+        pytest.fail("fitted again")
+
+    fit_process(store.first(TRAINED), folder, PLANAR, QUICK, on_output=fail)
+
+
+def test_two_advances_equal_a_long_advance(model, store):
+    scene, initial, controls = pushes_of(store)
+    dynamics, halves = model.dynamics, []
+    carry = dynamics.begin(scene, initial)
+    whole = dynamics.advance(scene, carry, controls)[1]
+    for part in (slice(0, 9), slice(9, None)):
+        some = PathControls(controls.position[:, part], controls.velocity[:, part])
+        carry, trajectory = dynamics.advance(scene, carry, some)
+        halves.append(np.asarray(pack_motion(trajectory.states)))
+    # Rates are per metre: the heading of nine steps is that of all but for rounding.
+    whole, parts = pack_motion(whole.states), np.concatenate(halves, axis=1)
+    np.testing.assert_allclose(parts[..., :3], whole[..., :3], atol=2e-5)
+
+
+def test_velocities_fit_poses(model, store):
+    scene, initial, controls = pushes_of(store)
+    states = model.predict(scene, initial, controls).states
+    position = np.asarray(states.position, np.float64)
+    step = np.diff(position, axis=1) / scene.time_step
+    np.testing.assert_allclose(step, states.velocity[:, 1:], atol=2e-4)
+
+
+def test_nothing_is_added_while_the_pusher_is_at_rest(model, store):
+    scene, initial, controls = pushes_of(store)
+    path = jnp.broadcast_to(initial.pusher_position[:, None], controls.position.shape)
+    still = PathControls(path, jnp.zeros_like(path))
+    physics = load_model("physics").predict(scene, initial, still)
+    found = model.predict(scene, initial, still)
+    for part in ("position", "angle"):
+        known = getattr(physics.states, part)
+        np.testing.assert_allclose(getattr(found.states, part), known, atol=1e-7)
+
+
+def test_a_turned_table_turns_the_prediction(model, store):
+    scene, initial, controls = pushes_of(store)
+    angle = 1.1
+
+    def turn(vector):
+        return rotate(vector, jnp.full(vector.shape[:-1], angle))
+
+    turned = eqx.tree_at(
+        lambda s: (s.position, s.angle, s.pusher_position),
+        initial,
+        (
+            turn(initial.position),
+            initial.angle + angle,
+            turn(initial.pusher_position),
+        ),
+    )
+    whole = PathControls(turn(controls.position), turn(controls.velocity))
+    plain = model.predict(scene, initial, controls).final
+    found = model.predict(scene, turned, whole).final
+    np.testing.assert_allclose(found.position, turn(plain.position), atol=3e-6)
+    np.testing.assert_allclose(found.angle, plain.angle + angle, atol=3e-5)
+
+
+def test_regions_hold_about_as_many_ends_as_they_promise(model, tests):
+    found = coverage_of(evaluate([model], tests))
+    assert {(each.body, each.kind) for each in found} == {
+        *((1, "pos"), (1, "rot"), (2, "pos"), (2, "rot"))
+    }
+    for each in found:
+        assert 60 <= each.inside.value <= 100  # %, of 15 pushes
+        assert 0 < each.size.value <= each.score.value
+
+
+def test_the_quantile_holds_its_level_for_exchangeable_scores():
+    rng = np.random.default_rng(0)
+    held = []
+    for _ in range(400):
+        scores = rng.exponential(size=(51, 1, 2))
+        held.append(scores[-1] <= quantile(scores[:-1]))
+    assert abs(np.mean(held) - LEVEL) < 0.03
+    assert (quantile(np.arange(5.0)[:, None, None] + np.zeros((1, 1, 2))) == 4).all()
+
+
+def test_interval_scores_are_those_of_the_definition():
+    """Along a push to the left, an end 3 mm ahead and 1 mm aside."""
+    region = Region(
+        heading=jnp.array([np.pi / 2]),
+        axes=jnp.array([[[2e-3, 0.5e-3]]]),
+        turn=jnp.array([[0.1]]),
+        plain=jnp.array([[4e-3, 0.3]]),
+    )
+    true = np.array([[[-1e-3, 3e-3, 2 * np.pi + 0.25]]])
+    found = measured(region, np.zeros((1, 1, 3)), true)
+    radius, scaled = 1.0, np.hypot(1.5, 2.0)  # mm; distance in half axes
+    expected = radius + MISSED * (scaled - 1) * radius
+    np.testing.assert_allclose(found["score_pos"], expected, rtol=1e-5)
+    np.testing.assert_allclose(found["plain_score_pos"], 4.0, rtol=1e-5)
+    width, error = np.rad2deg([0.1, 0.25])
+    turned = width + MISSED * (error - width)
+    np.testing.assert_allclose(found["score_rot"], turned, rtol=1e-5)
+    assert found["inside_pos"] == 0
+    assert found["inside_rot"] == 0
+
+
+def test_pushes_that_it_was_fitted_to_are_refused(model, store):
+    with pytest.raises(BadCheckpoint, match=f"{TRAINED} of these {TRAINED} pushes"):
+        evaluate([model], store.first(TRAINED))
+
+
+def test_it_is_a_model_in_control(model):
+    planner = sn.make_planner("greedy")
+    scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
+    state = scene.in_a_row()
+    goal = np.asarray(state.position[1]) + [0.03, 0.0]
+    plan = planner.plan(model.dynamics, PushToGoal(jnp.asarray(goal)), scene, state)
+    assert plan.distance < 0.025  # m; the goal is 30 mm ahead
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"kind": "direct-force"}, "kind is 'direct-force'"),
+        ({"bodies": 3}, "3 disks"),
+        ({"pushes": 4}, "4 pushes that are not repeats"),
+    ],
+)
+def test_pushes_that_cannot_be_used_are_refused(changes, message, tmp_path):
+    info = info_of(changes.pop("pushes", 12), **changes)
+    if info.kind == "direct-force":
+        store = generate(
+            replace(PUSHES, setup="direct-force", pushes=8), tmp_path / "data"
+        )
+    else:
+        write_store(tmp_path / "data", info, made_up(info))
+        store = open_store(tmp_path / "data")
+    with pytest.raises(BadStore, match=message):
+        fit_process(store, tmp_path / "gp", PLANAR, ProcessSettings())
+    assert not (tmp_path / "gp").exists()
+
+
+def test_an_input_that_never_varies_is_refused(store):
+    """All simulated pushes start at one place of the table."""
+    one = store.take([0] * 8)
+    with pytest.raises(BadInput, match="the contact angle is the same in all pushes"):
+        ends_of(one, PLANAR, "angle")
+
+
+def edited(folder, tmp_path, **changes):
+    for name in (PROCESS, ARRAYS):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    card = json.loads((tmp_path / PROCESS).read_text())
+    (tmp_path / PROCESS).write_text(json.dumps(card | changes))
+    return str(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"weights": "0" * 64}, "weights is another hash"),
+        ({"trained_pushes": 7}, "inputs is float64"),
+        ({"disks": 3}, "disks"),
+        ({"inputs": ["contact_angle"]}, "inputs is float64"),
+        ({"inputs": ["../x"]}, "inputs"),
+        ({"kind": "direct-force"}, "kind"),
+        ({"format_version": 2}, "format_version"),
+    ],
+)
+def test_an_edited_card_is_refused(folder, tmp_path, changes, message):
+    with pytest.raises(BadCheckpoint, match=message) as refused:
+        load_model(edited(folder, tmp_path, **changes))
+    assert "\n" not in str(refused.value)
+
+
+def test_edited_arrays_are_refused(folder, tmp_path):
+    name = edited(folder, tmp_path)
+    data = bytearray((tmp_path / ARRAYS).read_bytes())
+    data[-9] ^= 1
+    (tmp_path / ARRAYS).write_bytes(data)
+    with pytest.raises(BadCheckpoint, match="another hash"):
+        load_model(name)
+    (tmp_path / ARRAYS).write_bytes(data[:100])
+    with pytest.raises(BadCheckpoint, match="truncated"):
+        load_model(name)
+
+
+def test_tune_identifies_the_engine_first(store, tmp_path):
+    some = sn.open_pushes(store.path).take(range(12))
+    found = sn.tune("gp", some, iterations=3, out=tmp_path / "gp")
+    assert found.id.kind == "gp"
+    assert (tmp_path / "gp" / "engine" / "identified.json").is_file()
+    again = sn.load(tmp_path / "gp")
+    assert again.digest == found.digest
+
+
+def test_settings_of_networks_are_refused(store):
+    with pytest.raises(BadInput, match="`recipe` and `start` are of networks"):
+        sn.tune("gp", store, start="sain")
+    with pytest.raises(BadInput, match="`features` is of `gp`"):
+        sn.tune("sain", store, features="side")
