@@ -104,16 +104,24 @@ def blocks(values: Float[np.ndarray, " push"], count: int) -> Int[np.ndarray, " 
     return order * count // len(values)
 
 
-def schemes(store: Store, scale: Scale) -> Mapping[str, Int[np.ndarray, " push"]]:
-    """Return the fold of each push of one surface, by the name of the scheme."""
-    count = FOLDS[scale]
+def schemes(
+    whole: Store, rows: Int[np.ndarray, " push"], scale: Scale
+) -> Mapping[str, Int[np.ndarray, " push"]]:
+    """Return the fold of each push of one surface, by the name of the scheme.
+
+    Args:
+        whole: the pushes on all surfaces; folds by kind are those of other studies.
+        rows: of one surface.
+        scale: of the study.
+    """
+    count, store = FOLDS[scale], whole.take(rows)
     names = ("initial", "initial_pusher", "command_position", "steps")
     arrays = store.read(slice(None), names)
     place, start = arrays["initial"][:, 0, :3], arrays["initial_pusher"]
     last = arrays["command_position"][np.arange(len(start)), arrays["steps"] - 1]
     ahead, normal = last - start, place[:, :2] - start
     side = np.arctan2(normal[:, 1], normal[:, 0]) - place[:, 2]
-    found = {"kind": fold_of_push(store.repeats(), count)}
+    found = {"kind": fold_of_push(whole.repeats(), count)[rows]}
     if scale == "quick":
         return found
     return found | {
@@ -136,7 +144,7 @@ def _plan(scope: Scope) -> Plan:
     unions: dict[str, list[str]] = {}
     for surface, rows in surfaces_of(store).items():
         own = store.take(rows)
-        for scheme, owner in schemes(own, scope.scale).items():
+        for scheme, owner in schemes(store, rows, scope.scale).items():
             label = f"{scheme}, {surface}"
             unions.setdefault(scheme, []).append(label)
             factors: dict[str, float | str] = {"folds": scheme, "surface": surface}
