@@ -32,6 +32,7 @@ from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.controls import PathControls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.state import pack_motion
+from sainet.studies.run_report import page_of
 from sainet.tasks.push_to_goal import PushToGoal
 
 PUSHES = GenerateConfig(
@@ -319,6 +320,12 @@ def test_tune_identifies_the_engine_first(store, tmp_path):
     assert (tmp_path / "gp" / "engine" / "identified.json").is_file()
     again = sn.load(tmp_path / "gp")
     assert again.digest == found.digest
+
+
+def test_its_report_says_what_it_is(folder):
+    page = page_of(folder)
+    assert f"from {TRAINED} pushes that the engine planar simulated, of 2 disks" in page
+    assert "bearing, contact angle" in page
 
 
 def test_settings_of_networks_are_refused(store):

@@ -74,8 +74,8 @@ def known_inputs(
         **_vector("disk_on_table", unit(turned)),
     }
     for body in range(scene.body_count):
-        found[f"mass_{body}"] = scene.mass[..., body]
-        found[f"radius_{body}"] = scene.radius[..., body]
+        found[f"mass_{body + 1}"] = scene.mass[..., body]
+        found[f"radius_{body + 1}"] = scene.radius[..., body]
     if scene.body_count > 1:
         other = jnp.sum((1 - pushed)[..., None] * state.position, axis=-2)
         line = rotate(other - place, -heading)

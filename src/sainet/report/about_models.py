@@ -1,0 +1,62 @@
+"""What a trained model is, in sentences that a reader understands."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from sainet.engines import RECORDED
+from sainet.learning.log import LogLine
+from sainet.models.card import Card
+from sainet.models.process_card import ProcessCard
+
+_SETUPS = {
+    "robot": "a pusher that follows a path",
+    "direct-force": "a pusher that a force drives",
+}
+
+
+def of_network(card: Card, history: Sequence[LogLine], folder: Path) -> Iterator[str]:
+    """Yield what a network is, how its training went, and what to do next."""
+    yield _made_of(card)
+    if len(history) > 1:
+        first, last = history[0], history[-1]
+        factor = first.loss / last.loss if last.loss else 0.0
+        sentence = (
+            f"Training took {last.iteration:,} iterations. The loss was "
+            f"{first.loss:.3g} at iteration {first.iteration}, and is "
+            f"{last.loss:.3g} now"
+        )
+        more = f", {factor:.1f} times less." if factor >= 1 else ": it did not fall."
+        yield sentence + more
+    yield _purpose(card, folder)
+
+
+def of_process(card: ProcessCard, folder: Path) -> Iterator[str]:
+    """Yield what a Gaussian process is, and what to do next."""
+    yield _made_of(card)
+    words = ", ".join(name.replace("_", " ") for name in card.inputs)
+    yield f"Its inputs at the start of a push are: {words}."
+    yield (
+        "It states in which region a push ends with a probability of 90 %, set on "
+        "pushes that no fit saw; 'sainet evaluate' shows whether that holds on others."
+    )
+    yield _purpose(card, folder)
+
+
+def _made_of(card: Card | ProcessCard) -> str:
+    origin = (
+        "recorded pushes"
+        if card.truth_engine == RECORDED
+        else f"pushes that the engine {card.truth_engine} simulated"
+    )
+    disks = f"{card.disks} disk" + ("s" if card.disks > 1 else "")
+    label = card.identity.label
+    return f"{label}, from {card.trained_pushes:,} {origin}, of {disks}."
+
+
+def _purpose(card: Card | ProcessCard, folder: Path) -> str:
+    return (
+        f"It predicts pushes by {_SETUPS[card.kind]}, in steps of "
+        f"{1000 * card.time_step:.3g} ms. 'sainet evaluate' shows whether it is better "
+        "than the engine alone: compare physics, physics-true and "
+        f"{folder} on pushes that it was not trained on."
+    )
