@@ -34,7 +34,7 @@ def test_a_network_is_described_by_its_card():
 def test_the_training_is_told_as_it_went():
     fell = (LogLine(100, 8.0, None), LogLine(200, 2.0, None))
     assert sentences(fell)[1] == (
-        "Training took 200 iterations. The loss was 8 at iteration 100 and is 2 now, "
+        "Training took 200 iterations. The loss was 8 at iteration 100, and is 2 now, "
         "4.0 times less."
     )
     assert sentences(fell[::-1])[1].endswith("is 8 now: it did not fall.")
