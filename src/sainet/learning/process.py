@@ -25,7 +25,7 @@ from sainet.models.correctors.process import (
     RESIDUALS,
     kernel_of,
     known_inputs,
-    way_of,
+    travel_of,
 )
 from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.models.inputs import push_frame
@@ -53,10 +53,10 @@ ADDED: Mapping[ProcessFeatures, tuple[str, ...]] = {
     "place": ("place", "normal_on_table", "disk_on_table"),
 }
 _WORDS = {"angle": "contact angle", "side": "side of the disk", "place": "place"}
-_ENOUGH = 1000  # pushes for amplitude, length scales and noise; the rest conditions
+_ENOUGH = 300  # pushes for amplitude, length scales and noise; the rest conditions
 _FAR = 4.0  # standard deviations, outputs beyond are cut: failed recordings
 _CONSTANT = 1e-5  # standard deviation of an input, relative to its mean
-_SHORTEST = 1e-3  # m, the shortest way of the pusher that tells anything
+_SHORTEST = 1e-3  # m, the shortest travel of the pusher that tells anything
 # Normal prior of the logarithms: amplitude, noise (of standardised outputs), lengths
 # (of standardised inputs), and bounds.
 _PRIOR = {"amplitude": 0.0, "noise": -0.7, "length": 1.0}
@@ -69,19 +69,19 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Ends:
-    """Inputs and residuals of pushes, per metre of the pusher's way."""
+    """Inputs and residuals of pushes, per metre of the pusher's travel."""
 
     names: tuple[str, ...]  # of the inputs
     inputs: Float[np.ndarray, "push input"]
     rates: Float[np.ndarray, "push output"]
-    way: Float[np.ndarray, " push"]  # m
+    travel: Float[np.ndarray, " push"]  # m
     kinds: Int[np.ndarray, " push"]  # equal for pushes that stay together
 
     def take(self, rows: Bool[np.ndarray, " push"]) -> "Ends":
         """Return some of the pushes."""
-        inputs, rates, way = self.inputs[rows], self.rates[rows], self.way[rows]
+        inputs, rates, travel = self.inputs[rows], self.rates[rows], self.travel[rows]
         return replace(
-            self, inputs=inputs, rates=rates, way=way, kinds=self.kinds[rows]
+            self, inputs=inputs, rates=rates, travel=travel, kinds=self.kinds[rows]
         )
 
 
@@ -139,7 +139,7 @@ def fit_process(
         camera=internal.camera,
         data=store.content,
         disks=info.bodies,
-        trained_pushes=len(ends.way),
+        trained_pushes=len(ends.travel),
         pushes=digests_to_text(store.push_hashes()),
         weights=content_hash(data),
         inputs=ends.names,
@@ -190,10 +190,10 @@ def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -
     """
     prediction = Prediction(internal, store.info)
     arrays = prediction.complete(store.read(slice(None), prediction.names))
-    inputs, rates, way = (
+    inputs, rates, travel = (
         jax.tree.map(np.asarray, each) for each in _ends(prediction.batch(arrays))
     )
-    known = np.isfinite(rates).all(axis=1) & (way > _SHORTEST)
+    known = np.isfinite(rates).all(axis=1) & (travel > _SHORTEST)
     if known.sum() < RESIDUALS:
         raise BadStore(
             f"{store.path}: {known.sum()} pushes of at least 1 mm whose ends were "
@@ -204,20 +204,20 @@ def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -
     values = np.stack([inputs[name] for name in names], axis=1).astype(np.float64)
     rates = rates[known].astype(np.float64)
     kinds = store.repeats()[known]
-    return Ends(names, values, rates, way[known].astype(np.float64), kinds)
+    return Ends(names, values, rates, travel[known].astype(np.float64), kinds)
 
 
 @jax.jit
 def _ends(batch: PushBatch) -> tuple[dict[str, Array], Array, Array]:
-    """Return all inputs, and the residuals per metre of way; NaN where unobserved."""
+    """Return all inputs, and residuals per metre of travel; NaN where unobserved."""
     seen, count = batch.pose_observed, batch.truth.shape[1]
     last = count - 1 - jnp.argmax(seen[:, ::-1], axis=1)
     rows = jnp.arange(len(last))
     assert batch.simulated is not None
     missed = (batch.truth - batch.simulated)[rows, last, :, :3]
     missed = jnp.where(seen.any(axis=1)[:, None, None], missed, jnp.nan)
-    way, heading = way_of(batch.controls, batch.initial)
-    driven = jnp.cumsum(way, axis=1)[rows, last]
+    travel, heading = travel_of(batch.controls, batch.initial)
+    driven = jnp.cumsum(travel, axis=1)[rows, last]
     cosine, sine = jnp.cos(heading)[:, None], jnp.sin(heading)[:, None]
     x, y, turned = missed[..., 0], missed[..., 1], missed[..., 2]
     turned = jnp.mod(turned + jnp.pi, 2 * jnp.pi) - jnp.pi

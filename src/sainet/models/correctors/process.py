@@ -2,7 +2,7 @@
 
 Each residual (along and across the push, and in angle, of each body) is a Gaussian
 process of the start of the push: Matern 3/2, one length scale for each input, noise.
-It grows in proportion to the way of the pusher, so that it has a value at every step.
+It grows in proportion to the travel of the pusher, and has a value at every step.
 """
 
 import equinox as eqx
@@ -25,7 +25,7 @@ from sainet.scenes.state import State, Trajectory
 
 BODIES = 2  # at most
 RESIDUALS = 3  # of a body: along the push (m), across it (m), angle (rad)
-_SMALLEST = 1e-6  # m, a shorter way of the pusher has no direction
+_SMALLEST = 1e-6  # m, a shorter travel of the pusher has no direction
 _MATERN = kernels.Matern32(distance=L2Distance())
 
 
@@ -91,7 +91,7 @@ class Process(eqx.Module):
     """Gaussian processes of the same inputs, one for each output, given pushes.
 
     Inputs are standardised. So are outputs: `mean` and `scale` are in metres or radians
-    for each metre of the pusher's way.
+    for each metre of the pusher's travel.
     """
 
     inputs: Float[Array, "push input"]  # of the pushes that it was fitted to
@@ -133,7 +133,7 @@ class ResidualProcess(AbstractCorrector):
     centre: Float[Array, " input"]
     width: Float[Array, " input"]  # inputs are centred, then divided by it
     # Of 90 % regions of position and rotation: factors of the standard deviations, and
-    # sizes that are the same for all pushes (m, rad, for each metre of way).
+    # sizes that are the same for all pushes (m, rad, for each metre of travel).
     reach: Float[Array, "body 2"]
     plain: Float[Array, "body 2"]
     inputs: Inputs
@@ -151,14 +151,14 @@ class ResidualProcess(AbstractCorrector):
         controls: Controls,
         simulated: Trajectory | None,
     ) -> Prediction:
-        """Add the expected residual, in proportion to the pusher's way so far."""
+        """Add the expected residual, which grows with the travel of the pusher."""
         assert simulated is not None
         assert start.simulated is not None
         states, before = simulated.states, start.predicted
-        way, heading = way_of(controls, before)
+        travel, heading = travel_of(controls, before)
         rate = self._rates(scene, start, heading)[0]
-        moved = rate[:, None] * jnp.cumsum(way, axis=1)[..., None, None]
-        speed = rate[:, None] * (way / scene.time_step)[..., None, None]
+        moved = rate[:, None] * jnp.cumsum(travel, axis=1)[..., None, None]
+        speed = rate[:, None] * (travel / scene.time_step)[..., None, None]
         turn = heading[:, None, None]
         already = before.position - start.simulated.position
         turned = before.angle - start.simulated.angle
@@ -174,8 +174,8 @@ class ResidualProcess(AbstractCorrector):
 
     def region(self, scene: Scene, start: Start, controls: Controls) -> Region:
         """Return the regions about the predicted ends of pushes."""
-        way, heading = way_of(controls, start.predicted)
-        whole = way.sum(axis=1)[:, None, None]
+        travel, heading = travel_of(controls, start.predicted)
+        whole = travel.sum(axis=1)[:, None, None]
         grown = self._rates(scene, start, heading)[1] * whole
         return Region(
             heading=heading,
@@ -187,7 +187,7 @@ class ResidualProcess(AbstractCorrector):
     def rates(
         self, inputs: Float[Array, "push input"]
     ) -> tuple[Float[Array, "push output"], Float[Array, "push output"]]:
-        """Return mean and deviation of residuals for each metre of way (m, m, rad)."""
+        """Return mean and deviation of residuals per metre of travel (m, m, rad)."""
         return self.process((inputs - self.centre[None]) / self.width[None])
 
     def _rates(
@@ -198,10 +198,10 @@ class ResidualProcess(AbstractCorrector):
         return mean.reshape(shape), deviation.reshape(shape)
 
 
-def way_of(
+def travel_of(
     controls: Controls, start: State
 ) -> tuple[Float[Array, "push time"], Float[Array, " push"]]:
-    """Return the pusher's way in each step (m), and its heading on the table (rad)."""
+    """Return the travel of the pusher in each step (m), and its heading (rad)."""
     path = controls.command
     whole = jnp.concatenate([start.pusher_position[:, None], path], axis=1)
     straight = path[:, -1] - start.pusher_position
