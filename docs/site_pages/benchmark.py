@@ -40,11 +40,14 @@ def rankings(root: Path) -> str:
     evidence, found = Evidence(root), entries(root)
     parts = []
     for name, track in tracks().items():
-        study = f"[study](results/{track.study}.md)"
-        ours = standings(evidence.summary(track.study), track, study)
+        ours: dict[str, Standing] = {}
+        for study, condition in {track.study: track.condition, **track.beside}.items():
+            origin = f"[study](results/{study}.md)"
+            for each in standings(evidence.summary(study), condition, origin):
+                ours.setdefault(each.label, each)
         parts.append(
             f"## Track `{name}`\n\n{track.title}, of the hash `{track.hash[:12]}`:\n\n"
-            f"    {track.command}\n\n{ranking([*ours, *found[name]], track)}\n"
+            f"    {track.command}\n\n{ranking([*ours.values(), *found[name]], track)}\n"
         )
     return "\n".join(parts)
 
@@ -60,11 +63,11 @@ def entries(root: Path) -> dict[str, list[Standing]]:
     return found
 
 
-def standings(summary: Summary, track: Track, origin: str) -> list[Standing]:
-    """Return the models that a study measured on a track."""
+def standings(summary: Summary, condition: str, origin: str) -> list[Standing]:
+    """Return the models that a study measured in a condition."""
     rows: dict[str, list[Row]] = {}
     for row in (*summary.rows, *summary.predictions):
-        if row.condition == track.condition:
+        if row.condition == condition:
             rows.setdefault(row.model, []).append(row)
     models = {model.slug: model for model in summary.models}
     return [

@@ -195,7 +195,7 @@ def test_models_are_ranked_by_their_mean_errors(page):
     assert page.ranks([0.3, 0.1, 0.3, 0.2]) == [3, 1, 3, 2]
     for track in benchmark.tracks().values():
         summary = Evidence(REPOSITORY).summary(track.study)
-        text = page.ranking(page.standings(summary, track, "study"), track)
+        text = page.ranking(page.standings(summary, track.condition, "study"), track)
         lines = [line.split(" | ") for line in text.splitlines()[2:]]
         slugs = {model.label: model.slug for model in summary.models}
         means = []

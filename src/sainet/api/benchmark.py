@@ -38,6 +38,7 @@ class Track(Struct, frozen=True, kw_only=True):
     command: str  # that makes the dataset
     hash: str  # of starts, commands, repeats and true poses, by `hash_of`
     condition: str = ""  # of the study; empty: its only one
+    beside: dict[str, str] = {}  # conditions of other studies on the same folds
     position: str = "pos_mm"  # error that counts: mean over a push, or at its end (mm)
     rotation: str = "rot_deg"  # the same (degrees)
     folds: int = 1  # 1: models may be trained on any pushes but the track's

@@ -53,7 +53,7 @@ ADDED: Mapping[ProcessFeatures, tuple[str, ...]] = {
     "place": ("place", "normal_on_table", "disk_on_table"),
 }
 _WORDS = {"angle": "contact angle", "side": "side of the disk", "place": "place"}
-_ENOUGH = 300  # pushes for amplitude, length scales and noise; the rest conditions
+_ENOUGH = 1000  # pushes for amplitude, length scales and noise; the rest conditions
 _FAR = 4.0  # standard deviations, outputs beyond are cut: failed recordings
 _CONSTANT = 1e-5  # standard deviation of an input, relative to its mean
 _SHORTEST = 1e-3  # m, the shortest travel of the pusher that tells anything

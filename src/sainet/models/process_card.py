@@ -38,7 +38,7 @@ class ProcessSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How a process was fitted."""
 
     features: ProcessFeatures = "side"
-    iterations: Count = 40  # of the optimiser, at most, for each output
+    iterations: Count = 50  # of the optimiser, at most, for each output
     seed: Annotated[int, msgspec.Meta(ge=0)] = 0
     folds: Annotated[int, msgspec.Meta(ge=2)] = 5  # that calibrate its uncertainty
 
