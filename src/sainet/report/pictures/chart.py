@@ -35,12 +35,12 @@ _CHOICES = (
     ),
     _Choice(
         ("Do all pushes happen at one", "place of one table?"),
-        ("Tune an additive network that", "takes the place as an input"),
+        ("Fit a Gaussian process", "with the place as an input"),
         "sain-true",
     ),
     _Choice(
-        ("Do the test pushes show that", "a network errs clearly less?"),
-        ("Use the tuned SAIN, or IN:", "with many pushes they are level"),
+        ("Do test pushes show that a", "learned model errs clearly less?"),
+        ("Use it: a Gaussian process,", "or a tuned SAIN or IN"),
         "sain",
     ),
 )
