@@ -18,7 +18,8 @@ from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import MISSED, coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
-from sainet.learning.process import LEVEL, ends_of, fit_process, quantile
+from sainet.learning.process import LEVEL, fit_process, quantile
+from sainet.learning.process_ends import ends_of
 from sainet.models.correctors import Region
 from sainet.models.library import load_model
 from sainet.models.process_card import (

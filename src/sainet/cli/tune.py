@@ -52,9 +52,9 @@ class Changes:
     iterations."""
     features: Features | ProcessFeatures | None = None
     """Inputs. Of a network: paper; place adds the place on the table and the absolute
-    angle, for pushes at one place of one table (default: paper). Of a Gaussian process:
-    the contact angle; side adds the side of the disk; place adds both (default: side).
-    """
+    angle, for pushes at one place of one table. Of a Gaussian process: angle, of the
+    contact; side adds the side of the disk; place adds both (default: paper, of a
+    Gaussian process side)."""
     seed: int = RESIDUAL.seed
     """Random seed."""
     log_every: int = RESIDUAL.log_every

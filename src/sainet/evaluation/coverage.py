@@ -6,15 +6,18 @@ twenty times as much as the end lies outside. A region of one size for all pushe
 calibrated on the same pushes, stands beside them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import msgspec
 import numpy as np
 from jaxtyping import Float
 
+from sainet.datasets.batch import PushBatch
 from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
+from sainet.evaluation.metrics import final_pose
 from sainet.models.correctors import Region
+from sainet.models.dynamics import AbstractDynamics
 
 MISSED = 10.0  # penalty for each half width outside: 1 / (1 - 0.9)
 KINDS = ("pos", "rot")
@@ -36,6 +39,32 @@ class Coverage(msgspec.Struct, frozen=True, kw_only=True):
     size: Estimate  # mean half width, mm or degrees
     score: Estimate  # mean interval score, mm or degrees
     over_plain: Estimate  # score over that of regions of one size
+
+
+def of_parts(
+    dynamics: AbstractDynamics,
+    batches: Iterable[PushBatch],
+    poses: Iterable[np.ndarray],
+    truths: Iterable[tuple[np.ndarray, np.ndarray]],
+) -> dict[str, list[np.ndarray]]:
+    """Return the measurements of each part of some pushes; none without regions.
+
+    Args:
+        dynamics: the model.
+        batches: of the pushes of each part.
+        poses: that it predicts for them, [push, time, body, 3] (m, m, rad).
+        truths: true poses, and where they were observed.
+    """
+    found: dict[str, list[np.ndarray]] = {}
+    for batch, pose, (true, seen) in zip(batches, poses, truths, strict=True):
+        carry = dynamics.begin(batch.scene, batch.initial)
+        region = dynamics.region(batch.scene, carry, batch.controls)
+        if region is None:
+            return {}
+        ends = final_pose(pose, seen), final_pose(true, seen)
+        for name, values in measured(region, *ends).items():
+            found.setdefault(name, []).append(values)
+    return found
 
 
 def measured(

@@ -18,7 +18,7 @@ from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessCard
-from sainet.runs.errors import BadInput, Diverged
+from sainet.runs.errors import BadInput
 
 PAPER_STEPS = 200
 OnPushes = Callable[[str, int], None]  # called with a model and its new predictions
@@ -185,19 +185,13 @@ def _coverage(
     model: Model, pushes: _Pushes, poses: Sequence[np.ndarray]
 ) -> metrics.Errors:
     """Return the measurements of the regions in which the model expects the ends."""
-    found: list[metrics.Errors] = []
-    for (part, steps), pose, truth in zip(
-        pushes.parts, poses, pushes.truths(), strict=True
-    ):
-        some = {name: array[part] for name, array in pushes.arrays.items()}
-        batch = to_batch(some, pushes.store.info, steps=steps)
-        carry = model.dynamics.begin(batch.scene, batch.initial)
-        region = model.dynamics.region(batch.scene, carry, batch.controls)
-        if region is None:
-            return {}
-        ends = metrics.final_pose(pose, truth[1]), metrics.final_pose(*truth)
-        found.append(coverage.measured(region, *ends))
-    return {k: pushes.in_order([each[k] for each in found]) for k in found[0]}
+    arrays, info = pushes.arrays, pushes.store.info
+    batches = (
+        to_batch({k: array[part] for k, array in arrays.items()}, info, steps=steps)
+        for part, steps in pushes.parts
+    )
+    found = coverage.of_parts(model.dynamics, batches, poses, pushes.truths())
+    return {k: pushes.in_order(values) for k, values in found.items()}
 
 
 def _predict_all(
@@ -221,21 +215,8 @@ def _predict_all(
             found.append(np.asarray(pose, np.float64)[: len(rows)])
             on_pushes(model.name, len(rows))
         poses.append(np.concatenate(found))
-        _check_finite(model, store, poses[-1], part)
+        metrics.check_finite(model.name, store.path, poses[-1], part)
     return poses
-
-
-def _check_finite(
-    model: Model, store: Store, poses: np.ndarray, part: np.ndarray
-) -> None:
-    """Raise `Diverged` if a pose is not finite: no mean of the model would be known."""
-    lost = part[~np.isfinite(poses).all(axis=(1, 2, 3))]
-    if len(lost):
-        raise Diverged(
-            f"{model.name}: its prediction of push {lost[0]} of {store.path} is not "
-            f"finite, nor are {len(lost) - 1} more of {len(part)}; leave the model "
-            "out, or train it again."
-        )
 
 
 def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:

@@ -6,13 +6,15 @@ A new error is one `Metric`, and one entry of `MEASURED` if it needs a new measu
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from sainet.datasets.splits import last_known
 from sainet.evaluation.intervals import Folds, Interval, Sample
+from sainet.runs.errors import Diverged
 
 REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
 
@@ -150,6 +152,22 @@ def travel_mm(
 ) -> Float[np.ndarray, "push body"]:
     """Return the distance between initial and final position of each body (mm)."""
     return 1000 * np.linalg.norm(final[..., :2] - initial[..., :2], axis=-1)
+
+
+def check_finite(
+    model: str,
+    path: Path,
+    poses: Float[np.ndarray, "push time body 3"],
+    rows: Int[np.ndarray, " push"],
+) -> None:
+    """Raise `Diverged` if a pose is not finite: no mean of the model would be known."""
+    lost = rows[~np.isfinite(poses).all(axis=(1, 2, 3))]
+    if len(lost):
+        raise Diverged(
+            f"{model}: its prediction of push {lost[0]} of {path} is not finite, nor "
+            f"are {len(lost) - 1} more of {len(rows)}; leave the model out, or train "
+            "it again."
+        )
 
 
 def final_pose(

@@ -2,8 +2,7 @@
 
 import functools
 import logging
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,24 +10,21 @@ import jax
 import jax.numpy as jnp
 import msgspec
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float
 from scipy.optimize import minimize
 from tinygp import GaussianProcess
 
-from sainet.datasets.batch import Prediction, PushBatch
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
+from sainet.learning.process_ends import Ends, ends_of
 from sainet.models.checkpoint import save_arrays
 from sainet.models.correctors.process import (
     BODIES,
     RESIDUALS,
     kernel_of,
-    known_inputs,
-    travel_of,
 )
-from sainet.models.identity import ModelId, ProcessFeatures
-from sainet.models.inputs import push_frame
+from sainet.models.identity import ModelId
 from sainet.models.process_card import (
     ARRAYS,
     MOST,
@@ -40,23 +36,14 @@ from sainet.models.process_card import (
 )
 from sainet.runs.digests import digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document
-from sainet.runs.errors import BadInput, BadStore
+from sainet.runs.errors import BadStore
 from sainet.runs.folders import open_run
 from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, Manifest
 
 LEVEL = 0.9  # probability that a region holds the end of a push
-# Inputs of each kind of features; every kind has those before it.
-ADDED: Mapping[ProcessFeatures, tuple[str, ...]] = {
-    "angle": ("contact_angle", "bearing", "distance", "mass_", "radius_"),
-    "side": ("normal_on_disk",),
-    "place": ("place", "normal_on_table", "disk_on_table"),
-}
-_WORDS = {"angle": "contact angle", "side": "side of the disk", "place": "place"}
 _ENOUGH = 1000  # pushes for amplitude, length scales and noise; the rest conditions
 _FAR = 4.0  # standard deviations, outputs beyond are cut: failed recordings
-_CONSTANT = 1e-5  # standard deviation of an input, relative to its mean
-_SHORTEST = 1e-3  # m, the shortest travel of the pusher that tells anything
 # Normal prior of the logarithms: amplitude, noise (of standardised outputs), lengths
 # (of standardised inputs), and bounds.
 _PRIOR = {"amplitude": 0.0, "noise": -0.7, "length": 1.0}
@@ -65,24 +52,6 @@ _BOUNDS = {"amplitude": (-4.0, 4.0), "noise": (-4.0, 4.0), "length": (-3.0, 5.0)
 Identify = Callable[[Path], InternalEngine]
 ENGINE = "engine"  # folder, inside the run folder, of the engine identified for it
 _log = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class Ends:
-    """Inputs and residuals of pushes, per metre of the pusher's travel."""
-
-    names: tuple[str, ...]  # of the inputs
-    inputs: Float[np.ndarray, "push input"]
-    rates: Float[np.ndarray, "push output"]
-    travel: Float[np.ndarray, " push"]  # m
-    kinds: Int[np.ndarray, " push"]  # equal for pushes that stay together
-
-    def take(self, rows: Bool[np.ndarray, " push"]) -> "Ends":
-        """Return some of the pushes."""
-        inputs, rates, travel = self.inputs[rows], self.rates[rows], self.travel[rows]
-        return replace(
-            self, inputs=inputs, rates=rates, travel=travel, kinds=self.kinds[rows]
-        )
 
 
 def fit_process(
@@ -179,82 +148,6 @@ def check_store(store: Store, settings: ProcessSettings) -> None:
             f"{path}: {kinds} pushes that are not repeats of each other; the "
             f"calibration needs at least {settings.folds}."
         )
-
-
-def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -> Ends:
-    """Return inputs and residuals of all pushes whose ends were observed.
-
-    Raises:
-        BadStore: too few ends were observed.
-        BadInput: an input that was asked for is the same in all pushes.
-    """
-    prediction = Prediction(internal, store.info)
-    arrays = prediction.complete(store.read(slice(None), prediction.names))
-    inputs, rates, travel = (
-        jax.tree.map(np.asarray, each) for each in _ends(prediction.batch(arrays))
-    )
-    known = np.isfinite(rates).all(axis=1) & (travel > _SHORTEST)
-    if known.sum() < RESIDUALS:
-        raise BadStore(
-            f"{store.path}: {known.sum()} pushes of at least 1 mm whose ends were "
-            "observed; record more."
-        )
-    inputs = {name: value[known] for name, value in inputs.items()}
-    names = _varying(inputs, features)
-    values = np.stack([inputs[name] for name in names], axis=1).astype(np.float64)
-    rates = rates[known].astype(np.float64)
-    kinds = store.repeats()[known]
-    return Ends(names, values, rates, travel[known].astype(np.float64), kinds)
-
-
-@jax.jit
-def _ends(batch: PushBatch) -> tuple[dict[str, Array], Array, Array]:
-    """Return all inputs, and residuals per metre of travel; NaN where unobserved."""
-    seen, count = batch.pose_observed, batch.truth.shape[1]
-    last = count - 1 - jnp.argmax(seen[:, ::-1], axis=1)
-    rows = jnp.arange(len(last))
-    assert batch.simulated is not None
-    missed = (batch.truth - batch.simulated)[rows, last, :, :3]
-    missed = jnp.where(seen.any(axis=1)[:, None, None], missed, jnp.nan)
-    travel, heading = travel_of(batch.controls, batch.initial)
-    driven = jnp.cumsum(travel, axis=1)[rows, last]
-    cosine, sine = jnp.cos(heading)[:, None], jnp.sin(heading)[:, None]
-    x, y, turned = missed[..., 0], missed[..., 1], missed[..., 2]
-    turned = jnp.mod(turned + jnp.pi, 2 * jnp.pi) - jnp.pi
-    along, across = cosine * x + sine * y, cosine * y - sine * x
-    residual = jnp.stack([along, across, turned], axis=-1).reshape(len(last), -1)
-    pushed = push_frame(batch.scene, batch.initial).pushed
-    inputs = known_inputs(batch.scene, batch.initial, pushed, heading)
-    return inputs, residual / driven[:, None], driven
-
-
-def _varying(
-    inputs: Mapping[str, np.ndarray], features: ProcessFeatures
-) -> tuple[str, ...]:
-    """Return the names of the wanted inputs that vary.
-
-    Raises:
-        BadInput: none of those that were asked for does.
-    """
-    every: list[ProcessFeatures] = [*ADDED]
-    found: list[str] = []
-    for each in every[: every.index(features) + 1]:
-        varying = [
-            key
-            for key, values in inputs.items()
-            if key.startswith(ADDED[each]) and _varies(values)
-        ]
-        if not varying:
-            raise BadInput(
-                f"`features`: the {_WORDS[each]} is the same in all pushes; record "
-                "other kinds of push, or leave it out."
-            )
-        found += varying
-    return tuple(found)
-
-
-def _varies(value: np.ndarray) -> bool:
-    return float(np.std(value)) > _CONSTANT * (1e-2 + abs(float(np.mean(value))))
 
 
 def _fit(

@@ -11,6 +11,7 @@ from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 
+import jax
 import numpy as np
 from jaxtyping import Float, Int
 from msgspec import structs
@@ -20,20 +21,24 @@ from sainet.datasets.store import Store
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join
-from sainet.evaluation.measurements import Condition, Measurements
+from sainet.evaluation.measurements import (
+    Condition,
+    Measurements,
+    read_measurements,
+)
 from sainet.identification.identify import identify_into
-from sainet.learning.process import ADDED, fit_process
+from sainet.learning.process import fit_process
+from sainet.learning.process_ends import ADDED
 from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.models.library import load_model
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
 from sainet.studies import Scale
-from sainet.studies.paper_setup import physics
 from sainet.studies.recorded_models import IDENTIFIED, surfaces_of
 from sainet.studies.recorded_pushes import JoinFolds
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Apart, Given, Step
-from sainet.studies.study import RECORDED, Plan, Scope, Study
+from sainet.studies.study import MEASUREMENTS, RECORDED, Plan, Scope, Study
 
 FOLDS = {"quick": 2, "paper": 5}
 FEATURES: tuple[ProcessFeatures, ...] = (*ADDED,)
@@ -61,6 +66,10 @@ class FitAll(Apart[tuple[Model, ...]]):
         """Return identified physics and the processes."""
         folder = runner.folder(self)
         self.work(folder)  # returns at once where it is finished
+        return self.models_in(folder)
+
+    def models_in(self, folder: Path) -> tuple[Model, ...]:
+        """Return identified physics and the processes of a finished folder."""
         engine = replace(load_model(str(folder / _ENGINE)), id=_PHYSICS)
         fitted = (
             replace(load_model(str(folder / features)), id=identity)
@@ -69,19 +78,29 @@ class FitAll(Apart[tuple[Model, ...]]):
         return engine, *fitted
 
 
-class Test(Step[Measurements]):
+class Test(Apart[Measurements]):
     """Errors and regions of all models on pushes that they were not fitted to."""
 
     models: FitAll
-    nominal: Step[Model]
     pushes: Given
     condition: Condition
 
+    def work(self, folder: Path) -> None:
+        """Predict the pushes, and write the measurements."""
+        if (folder / MEASUREMENTS).is_file():
+            return
+        fitted = self.models.models_in(folder.parent / self.models.folder_name)
+        found = evaluate((load_model("physics"), *fitted), self.pushes.store)
+        folder.mkdir(parents=True, exist_ok=True)
+        found.write(folder / MEASUREMENTS)
+        # Each fold compiles programs of its own; hundreds of them crash XLA.
+        jax.clear_caches()
+
     def run(self, runner: Runner) -> Measurements:
         """Return the errors."""
-        models = (runner.result(self.nominal), *runner.result(self.models))
-        found = evaluate(models, runner.result(self.pushes))
-        return found.in_condition(self.condition)
+        folder = runner.folder(self)
+        self.work(folder)
+        return read_measurements(folder / MEASUREMENTS).in_condition(self.condition)
 
 
 class WithUnions(Step[Measurements]):
@@ -139,7 +158,7 @@ def _longest_axis(places: Float[np.ndarray, "push 2"]) -> Float[np.ndarray, "2"]
 
 def _plan(scope: Scope) -> Plan:
     """Return processes that are fitted to each fold, and on each surface for others."""
-    store, nominal = scope.recorded_pushes(), physics()[0]
+    store = scope.recorded_pushes()
     parts: list[Step[Measurements]] = []
     unions: dict[str, list[str]] = {}
     for surface, rows in surfaces_of(store).items():
@@ -150,18 +169,16 @@ def _plan(scope: Scope) -> Plan:
             factors: dict[str, float | str] = {"folds": scheme, "surface": surface}
             condition = Condition(label=label, factors=factors)
             folds = tuple(_folds(own, rows, owner))
-            tests = (_test(f.training, f.tests, nominal, condition) for f in folds)
+            tests = (_test(f.training, f.tests, condition) for f in folds)
             parts.append(JoinFolds(tuple(tests), folds, condition))
     if scope.scale == "paper":
-        parts += _elsewhere(store, nominal)
+        parts += _elsewhere(store)
     joined = (Condition(label=k, parts=tuple(v)) for k, v in unions.items())
     return Plan(WithUnions(tuple(parts), tuple(joined)))
 
 
-def _test(
-    training: Store, tests: Store, nominal: Step[Model], condition: Condition
-) -> Test:
-    return Test(FitAll(Given(training)), nominal, Given(tests), condition)
+def _test(training: Store, tests: Store, condition: Condition) -> Test:
+    return Test(FitAll(Given(training)), Given(tests), condition)
 
 
 def _folds(
@@ -177,13 +194,13 @@ def _folds(
         )
 
 
-def _elsewhere(store: Store, nominal: Step[Model]) -> Iterator[Test]:
+def _elsewhere(store: Store) -> Iterator[Test]:
     """Yield models of one group of pushes on another: surfaces, and speeds."""
     groups = {name: store.of_group(name) for name in store.info.groups}
     for (trained, training), (tested, tests) in permutations(groups.items(), 2):
         label = f"{trained} to {tested}"
         condition = Condition(label=label, factors={"trained_on": trained})
-        yield _test(training, tests, nominal, condition)
+        yield _test(training, tests, condition)
 
 
 STUDY = Study(
