@@ -257,8 +257,8 @@ COUNTS = {
     ),
     "code lines of models that know how sure they are": (
         lambda: sum(map(code_lines, modules_of(TRUST))),
-        1_000,
-        1_000,
+        1_050,
+        1_050,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (
