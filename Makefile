@@ -61,7 +61,7 @@ pages: setup  ## Render docs/results/, figures and README.md from results/
 
 # The programs of the tutorials run; DOCS_ARGS='-D nb_execution_mode=off' leaves them out.
 docs: setup-dev  ## Build the documentation in docs/_build/html/index.html
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/sphinx-build -q -W --keep-going -E -j 2 \
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/sphinx-build -q -W --keep-going -E \
 		-b html $(DOCS_ARGS) docs docs/_build/html
 
 bench: setup-dev  ## Run the benchmarks
