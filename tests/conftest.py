@@ -8,6 +8,7 @@ pyproject.toml.
 import gc
 import os
 import shutil
+from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -53,6 +54,10 @@ for name in HEAVY:
 install_import_hook("sainet", "support.typechecker")
 
 
+MAPS = Path("/proc/self/maps")
+MOST_MAPS = 20_000
+
+
 class Chromium(NamedTuple):
     """Where Chromium and its driver are."""
 
@@ -70,6 +75,18 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 50, 100)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_compiled_programs() -> Iterator[None]:
+    """Forget compiled programs before the system has no room for their memory maps.
+
+    Linux allows a process 65,530 of them; XLA ends with a segmentation fault there.
+    """
+    yield
+    if len(MAPS.read_bytes().splitlines()) > MOST_MAPS:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(scope="session")
