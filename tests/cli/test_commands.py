@@ -294,6 +294,8 @@ def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
     assert {each["model"] for each in found} == {"gp"}
     error = sainet(*words, "--hold", 3, status=2).stderr
     assert "--hold is 3; it must be left out: it is a setting of networks" in error
+    error = sainet(*words, "--start", "sain", status=2).stderr
+    assert "--start is sain; it must be left out: it is a setting of networks" in error
     words = ("tune", "sain", "--data", pushes, "--out", tmp_path / "net")
     error = sainet(*words, "--features", "side", status=2).stderr
     assert "--features is side; it must be paper or place for a network" in error

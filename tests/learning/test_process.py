@@ -18,9 +18,9 @@ from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import MISSED, coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
-from sainet.learning.process import LEVEL, fit_process, quantile
+from sainet.learning.process import fit_process, quantile
 from sainet.learning.process_ends import ends_of
-from sainet.models.correctors import Region
+from sainet.models.correctors import CONFIDENCE, Region
 from sainet.models.library import load_model
 from sainet.models.process_card import (
     ARRAYS,
@@ -208,7 +208,7 @@ def test_the_quantile_holds_its_level_for_exchangeable_scores():
     for _ in range(400):
         scores = rng.exponential(size=(51, 1, 2))
         held.append(scores[-1] <= quantile(scores[:-1]))
-    assert abs(np.mean(held) - LEVEL) < 0.03
+    assert abs(np.mean(held) - CONFIDENCE) < 0.03
     assert (quantile(np.arange(5.0)[:, None, None] + np.zeros((1, 1, 2))) == 4).all()
 
 
@@ -231,6 +231,18 @@ def test_interval_scores_are_those_of_the_definition():
     np.testing.assert_allclose(found["score_rot"], turned, rtol=1e-5)
     assert found["inside_pos"] == 0
     assert found["inside_rot"] == 0
+
+
+@pytest.mark.parametrize("disks", [1, 3])
+def test_other_numbers_of_disks_are_refused(model, disks):
+    scene = sn.Scene.disks(mass=[1.0] * disks, radius=[0.055] * disks)
+    with pytest.raises(BadCheckpoint, match=f"of 2 disk.s., these have {disks};"):
+        model.predict(scene, scene.in_a_row(), sn.Push(contact_angle=0.1))
+
+
+def test_no_network_starts_from_a_process(folder, store):
+    with pytest.raises(BadCheckpoint, match="a Gaussian process; give the folder"):
+        sn.tune("sain", store, start=folder, iterations=1)
 
 
 def test_pushes_that_it_was_fitted_to_are_refused(model, store):
@@ -270,7 +282,7 @@ def test_pushes_that_cannot_be_used_are_refused(changes, message, tmp_path):
 
 
 def test_an_input_that_never_varies_is_refused(store):
-    """All simulated pushes start at one place of the table."""
+    """One push, eight times."""
     one = store.take([0] * 8)
     with pytest.raises(BadInput, match="the contact angle is the same in all pushes"):
         ends_of(one, PLANAR, "angle")
@@ -292,6 +304,7 @@ def edited(folder, tmp_path, **changes):
         ({"disks": 3}, "disks"),
         ({"inputs": ["contact_angle"]}, "inputs is float64"),
         ({"inputs": ["../x"]}, "inputs"),
+        ({"inputs": ["mass_3"]}, "inputs has 'mass_3', no input"),
         ({"kind": "direct-force"}, "kind"),
         ({"format_version": 2}, "format_version"),
     ],

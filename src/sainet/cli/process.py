@@ -25,9 +25,7 @@ class ProcessJob:
 
     data: Path
     out: Path
-    engine: (
-        str | None
-    )  # folder of identified parameters, or a simulator; None: identify
+    engine: str | None  # identified parameters, or a simulator; None: identify
     group: str | None  # None: all
     pushes: int | None  # from the start of the dataset; None: all
 
@@ -49,7 +47,7 @@ class ProcessJob:
         from sainet.datasets.store import open_store
         from sainet.learning.process import fit_process, fits_of
         from sainet.models.library import find_internal_engine
-        from sainet.models.process_card import load_process
+        from sainet.models.process_card import read_process_card
 
         settings = _settings(changes, usual)
         store = open_store(self.data)
@@ -72,7 +70,7 @@ class ProcessJob:
                 settings,
                 on_output=lambda: advance(1, ""),
             )
-        card = load_process(self.out)[1]
+        card = read_process_card(self.out)
         output.say(f"The Gaussian process of {card.trained_pushes} pushes: {self.out}")
         return {"out": str(self.out), "model": "gp", "loss": card.final_loss}
 

@@ -11,6 +11,9 @@ from sainet.cli.process import ProcessJob, for_networks
 from sainet.cli.train import Job
 from sainet.learning.recipes import FROM_ENGINE, RESIDUAL, recipe_for, start_named
 from sainet.models.identity import Features, ModelKind, ProcessFeatures
+from sainet.runs.errors import require
+
+_OF_NETWORKS = "left out: it is a setting of networks"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,7 +21,8 @@ class Changes:
     """Settings that differ from the recipe of the start."""
 
     iterations: int | None = None
-    """Gradient steps (default: 1,200 from the engine, 300 from a network)."""
+    """Gradient steps (default: 1,200 from the engine, 300 from a network, at most 50
+    for each output of gp)."""
     halve_every: int | None = None
     """Iterations between two halvings of the learning rate (default: 800 from the
     engine, 200 from a network)."""
@@ -63,7 +67,7 @@ class Changes:
 
 @dataclass(frozen=True, kw_only=True)
 class Tune:
-    """Train a network on few pushes, around an engine or from an existing network."""
+    """Train a network, or fit a Gaussian process, on few pushes."""
 
     model: Positional[ModelKind | Literal["gp"]]
     """Network: in (without an engine) or sain (around an engine). gp: a Gaussian
@@ -94,6 +98,8 @@ class Tune:
         given = {k: v for k, v in asdict(self.changes).items() if v is not None}
         job = self.data, self.out, self.engine, self.group, self.pushes
         if self.model == "gp":
+            require(self.start == FROM_ENGINE, "start", _OF_NETWORKS, self.start)
+            require(self.devices is None, "devices", _OF_NETWORKS, self.devices)
             return ProcessJob(*job).run(given, asdict(Changes()), self.output)
         recipe = recipe_for(start_named(self.start)).changed(**for_networks(given))
         return Job(

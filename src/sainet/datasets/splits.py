@@ -89,7 +89,23 @@ def make_folds(
             whatever the part.
     """
     rows = np.arange(store.info.pushes) if part is None else part
-    owner = fold_of_push(store.repeats(), count)[rows]
+    return folds_of(store, rows, fold_of_push(store.repeats(), count)[rows], count)
+
+
+def folds_of(
+    store: Store,
+    rows: Int[np.ndarray, " some"],
+    owner: Int[np.ndarray, " some"],
+    count: int,
+) -> list[Fold]:
+    """Divide some pushes of a store into given folds.
+
+    Args:
+        store: of all pushes.
+        rows: to use only, for tests and training.
+        owner: fold of each of them, from 0.
+        count: of the folds.
+    """
     return [
         Fold(
             number,

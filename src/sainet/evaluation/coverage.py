@@ -1,9 +1,10 @@
 """Whether models know how sure they are: regions that should hold the ends of pushes.
 
-Regions of position are ellipses, those of rotation intervals, both for 90 %. Their
-quality is the interval score (Gneiting and Raftery 2007): the size of a region, plus
-twenty times as much as the end lies outside. A region of one size for all pushes,
-calibrated on the same pushes, stands beside them.
+Regions of position are ellipses, those of rotation intervals. Their quality is half
+the interval score of Gneiting and Raftery (2007): the half width of a region, plus ten
+times the distance from it of an end outside. Of an ellipse, the half width is the
+radius of the circle of its area, and distances are scaled likewise. A region of one
+size for all pushes, calibrated on the same pushes, stands beside them.
 """
 
 from collections.abc import Iterable, Sequence
@@ -16,10 +17,10 @@ from sainet.datasets.batch import PushBatch
 from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.evaluation.metrics import final_pose
-from sainet.models.correctors import Region
+from sainet.models.correctors import CONFIDENCE, Region
 from sainet.models.dynamics import AbstractDynamics
 
-MISSED = 10.0  # penalty for each half width outside: 1 / (1 - 0.9)
+MISSED = 1 / (1 - CONFIDENCE)  # penalty for each mm or degree outside
 KINDS = ("pos", "rot")
 UNITS = {"pos": "mm", "rot": "deg"}
 # Names of further measurements of each push, by kind.
@@ -37,7 +38,7 @@ class Coverage(msgspec.Struct, frozen=True, kw_only=True):
     count: int  # pushes
     inside: Estimate  # %, share of the ends in their region
     size: Estimate  # mean half width, mm or degrees
-    score: Estimate  # mean interval score, mm or degrees
+    score: Estimate  # mean interval score, halved, mm or degrees
     over_plain: Estimate  # score over that of regions of one size
 
 
@@ -57,8 +58,7 @@ def of_parts(
     """
     found: dict[str, list[np.ndarray]] = {}
     for batch, pose, (true, seen) in zip(batches, poses, truths, strict=True):
-        carry = dynamics.begin(batch.scene, batch.initial)
-        region = dynamics.region(batch.scene, carry, batch.controls)
+        region = dynamics.region(batch.scene, batch.initial, batch.controls)
         if region is None:
             return {}
         ends = final_pose(pose, seen), final_pose(true, seen)

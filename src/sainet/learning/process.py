@@ -19,6 +19,7 @@ from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
 from sainet.learning.process_ends import Ends, ends_of
 from sainet.models.checkpoint import save_arrays
+from sainet.models.correctors import CONFIDENCE
 from sainet.models.correctors.process import (
     BODIES,
     RESIDUALS,
@@ -41,7 +42,6 @@ from sainet.runs.folders import open_run
 from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, Manifest
 
-LEVEL = 0.9  # probability that a region holds the end of a push
 _ENOUGH = 1000  # pushes for amplitude, length scales and noise; the rest conditions
 _FAR = 4.0  # standard deviations, outputs beyond are cut: failed recordings
 # Normal prior of the logarithms: amplitude, noise (of standardised outputs), lengths
@@ -268,7 +268,7 @@ def _sizes(off: Float[np.ndarray, "push output"]) -> Float[np.ndarray, "push bod
 
 
 def quantile(scores: Float[np.ndarray, "push body 2"]) -> Float[np.ndarray, "body 2"]:
-    """Return the conformal quantile: with `LEVEL`, the score of a new push is below."""
+    """Return the conformal quantile, below which `CONFIDENCE` of new scores lie."""
     count = len(scores)
-    rank = min(count, int(np.ceil(LEVEL * (count + 1))))
+    rank = min(count, int(np.ceil(CONFIDENCE * (count + 1))))
     return np.sort(scores, axis=0)[rank - 1]

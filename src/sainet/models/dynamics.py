@@ -60,9 +60,15 @@ class AbstractDynamics(eqx.Module):
         del hashes, steps, bodies
         return None
 
-    def region(self, scene: Scene, carry: Carry, controls: Controls) -> Region | None:
-        """Return the regions in which pushes end; None where they are not known."""
-        del scene, carry, controls
+    def region(self, scene: Scene, state: State, controls: Controls) -> Region | None:
+        """Return the regions in which pushes end; None where they are not known.
+
+        Args:
+            scene: of each push.
+            state: at the start of each push.
+            controls: of each push.
+        """
+        del scene, state, controls
         return None
 
     @abstractmethod
@@ -165,9 +171,9 @@ class SimulatorAugmented(AbstractDynamics):
         reached = Start(trajectory.final, carry.frame, simulated.final, carry.first)
         return reached, trajectory
 
-    def region(self, scene: Scene, carry: Start, controls: Controls) -> Region | None:
+    def region(self, scene: Scene, state: State, controls: Controls) -> Region | None:
         """Return the regions of the corrector."""
-        return self.network.region(scene, carry, controls)
+        return self.network.region(scene, self.begin(scene, state), controls)
 
 
 def stored_prediction(

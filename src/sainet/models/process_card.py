@@ -19,6 +19,7 @@ from sainet.models.correctors.process import (
     Inputs,
     Process,
     ResidualProcess,
+    input_names,
     kernel_of,
 )
 from sainet.models.identity import ModelId, ProcessFeatures
@@ -30,6 +31,7 @@ from sainet.scenes.recording import AGREES, CameraOffset
 
 PROCESS = "process.json"
 ARRAYS = "process.safetensors"
+_REMEDY = "fit it again"
 MOST = 5000  # pushes of one process: its covariance is a dense matrix
 Name = Annotated[str, msgspec.Meta(pattern=r"\A[a-z_0-9]{1,40}\Z")]
 
@@ -148,15 +150,27 @@ def is_process(folder: Path) -> bool:
     return (folder / PROCESS).is_file()
 
 
+def read_process_card(folder: Path) -> ProcessCard:
+    """Read the card of a Gaussian process.
+
+    Raises:
+        BadCheckpoint: damaged, out of bounds or of another format.
+    """
+    path = folder / PROCESS
+    card = read_document(path, ProcessCard, error=BadCheckpoint, remedy=_REMEDY)
+    for name in card.inputs:
+        if name not in input_names(card.disks):
+            raise BadCheckpoint(f"{path}: inputs has {name!r}, no input; {_REMEDY}.")
+    return card
+
+
 def load_process(folder: Path) -> tuple[ResidualProcess, ProcessCard]:
     """Read a Gaussian process and its card.
 
     Raises:
         BadCheckpoint: damaged, of another format, or the two do not fit.
     """
-    card = read_document(
-        folder / PROCESS, ProcessCard, error=BadCheckpoint, remedy="fit it again"
-    )
+    card = read_process_card(folder)
     pushes, inputs = card.trained_pushes, len(card.inputs)
     outputs = RESIDUALS * card.disks
     like = Fitted(

@@ -47,9 +47,10 @@ class OffsetCamera(AbstractDynamics):
         carry, trajectory = self.dynamics.advance(scene, carry, moved, simulated)
         return carry, Trajectory(trajectory.states.with_pusher_moved(-self._offset))
 
-    def region(self, scene: Scene, carry: Carry, controls: Controls) -> Region | None:
+    def region(self, scene: Scene, state: State, controls: Controls) -> Region | None:
         """Return the regions of the wrapped model."""
-        return self.dynamics.region(scene, carry, controls.moved(self._offset))
+        moved = state.with_pusher_moved(self._offset), controls.moved(self._offset)
+        return self.dynamics.region(scene, *moved)
 
     @property
     def _offset(self) -> Float[Array, "2"]:

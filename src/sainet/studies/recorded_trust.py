@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from msgspec import structs
 
-from sainet.datasets.splits import Fold, fold_of_push
+from sainet.datasets.splits import fold_of_push, folds_of
 from sainet.datasets.store import Store
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.evaluate import evaluate
@@ -45,7 +45,6 @@ FEATURES: tuple[ProcessFeatures, ...] = (*ADDED,)
 PROCESSES = {
     each: ModelId(kind="gp", simulator=IDENTIFIED, features=each) for each in FEATURES
 }
-SUBJECT = PROCESSES["side"].slug
 _PHYSICS = ModelId(kind="physics", simulator=IDENTIFIED)
 _ENGINE = "engine"
 
@@ -78,7 +77,7 @@ class FitAll(Apart[tuple[Model, ...]]):
         return engine, *fitted
 
 
-class Test(Apart[Measurements]):
+class EvaluateFitted(Apart[Measurements]):
     """Errors and regions of all models on pushes that they were not fitted to."""
 
     models: FitAll
@@ -162,13 +161,12 @@ def _plan(scope: Scope) -> Plan:
     parts: list[Step[Measurements]] = []
     unions: dict[str, list[str]] = {}
     for surface, rows in surfaces_of(store).items():
-        own = store.take(rows)
         for scheme, owner in schemes(store, rows, scope.scale).items():
             label = f"{scheme}, {surface}"
             unions.setdefault(scheme, []).append(label)
             factors: dict[str, float | str] = {"folds": scheme, "surface": surface}
             condition = Condition(label=label, factors=factors)
-            folds = tuple(_folds(own, rows, owner))
+            folds = tuple(folds_of(store, rows, owner, FOLDS[scope.scale]))
             tests = (_test(f.training, f.tests, condition) for f in folds)
             parts.append(JoinFolds(tuple(tests), folds, condition))
     if scope.scale == "paper":
@@ -177,24 +175,11 @@ def _plan(scope: Scope) -> Plan:
     return Plan(WithUnions(tuple(parts), tuple(joined)))
 
 
-def _test(training: Store, tests: Store, condition: Condition) -> Test:
-    return Test(FitAll(Given(training)), Given(tests), condition)
+def _test(training: Store, tests: Store, condition: Condition) -> EvaluateFitted:
+    return EvaluateFitted(FitAll(Given(training)), Given(tests), condition)
 
 
-def _folds(
-    store: Store, rows: Int[np.ndarray, " push"], owner: Int[np.ndarray, " push"]
-) -> Iterator[Fold]:
-    for number in range(owner.max() + 1):
-        mine = owner == number
-        yield Fold(
-            number,
-            training=store.take(np.flatnonzero(~mine)),
-            tests=store.take(np.flatnonzero(mine)),
-            rows=rows[mine],
-        )
-
-
-def _elsewhere(store: Store) -> Iterator[Test]:
+def _elsewhere(store: Store) -> Iterator[EvaluateFitted]:
     """Yield models of one group of pushes on another: surfaces, and speeds."""
     groups = {name: store.of_group(name) for name in store.info.groups}
     for (trained, training), (tested, tests) in permutations(groups.items(), 2):
@@ -207,6 +192,7 @@ STUDY = Study(
     question="On recorded pushes, does a Gaussian process around the identified engine "
     "err less than the engine, and does it know how sure it is?",
     plan=_plan,
+    subject=_PHYSICS.slug,
     claims=tuple(
         Claim(
             f"a Gaussian process ({each.features}) around the identified engine errs "
@@ -218,7 +204,7 @@ STUDY = Study(
                 metrics=("final_pos_mm", "final_rot_deg"),
             ),
         )
-        for scheme in ("kind", "place", "direction", "side", "order")
+        for scheme in ("place", "direction", "side", "order", "kind")
         for each in (PROCESSES["side"], PROCESSES["place"])
     ),
     needs=(RECORDED,),

@@ -16,7 +16,7 @@ from sainet.models.card import (
     read_card,
     read_identified,
 )
-from sainet.models.process_card import ProcessCard, is_process, load_process
+from sainet.models.process_card import ProcessCard, is_process, read_process_card
 from sainet.report.about_models import of_network, of_process
 from sainet.report.pages.page import REPORT, Report, to_page
 from sainet.report.writers import estimate_cells, estimate_sentences
@@ -116,7 +116,7 @@ def _estimates(identified: Identified) -> Iterator[str]:
 
 def _card(folder: Path) -> Card | ProcessCard | dict[str, object]:
     if is_process(folder):
-        return load_process(folder)[1]
+        return read_process_card(folder)
     return read_card(folder) if (folder / CARD).is_file() else {}
 
 

@@ -29,10 +29,14 @@ class Prediction(eqx.Module):
     deviation: Float[Array, "push time body 3"] | None = None
 
 
-class Region(NamedTuple):
-    """Where a push ends with a probability of 90 %: an ellipse, and an interval.
+CONFIDENCE = 0.9  # probability that a region holds the end of a push
 
-    Positions are in the ellipse and angles in the interval apart, each with 90 %.
+
+class Region(NamedTuple):
+    """Where a push ends with the probability `CONFIDENCE`: an ellipse, and an interval.
+
+    Each holds with this probability apart: the ellipse for positions, the interval
+    for angles.
     """
 
     heading: Float[Array, " push"]  # rad, of the first axis of the ellipse

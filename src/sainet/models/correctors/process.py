@@ -6,6 +6,7 @@ It grows in proportion to the travel of the pusher, and has a value at every ste
 """
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 from tinygp import kernels, transforms
@@ -18,6 +19,7 @@ from sainet.models.correctors import (
     Region,
     Start,
 )
+from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import direction, norm, rotate, unit, wrap_angle
 from sainet.scenes.scene import Scene
@@ -47,6 +49,15 @@ class Inputs(eqx.Module):
         assert start.first is not None
         known = known_inputs(scene, start.first, start.frame.pushed, heading)
         return jnp.stack([known[name] for name in self.names], axis=-1)
+
+
+def input_names(disks: int) -> frozenset[str]:
+    """Return the names of everything that can be an input, with so many disks."""
+    scene = Scene.disks(mass=[1.0] * disks, radius=[1.0] * disks)
+    push = jax.tree.map(
+        lambda x: jnp.asarray(x)[None], (scene, scene.in_a_row(), scene.mass, 0.0)
+    )
+    return frozenset(jax.eval_shape(known_inputs, *push))
 
 
 def known_inputs(
@@ -193,6 +204,12 @@ class ResidualProcess(AbstractCorrector):
     def _rates(
         self, scene: Scene, start: Start, heading: Float[Array, " push"]
     ) -> tuple[Float[Array, "push body 3"], Float[Array, "push body 3"]]:
+        disks = self.reach.shape[0]
+        if scene.body_count != disks:
+            raise BadCheckpoint(
+                f"model: its Gaussian process is for pushes of {disks} disk(s), these "
+                f"have {scene.body_count}; fit one to such pushes, or use a network."
+            )
         mean, deviation = self.rates(self.inputs.of(scene, start, heading))
         shape = (-1, scene.body_count, RESIDUALS)
         return mean.reshape(shape), deviation.reshape(shape)
