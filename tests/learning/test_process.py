@@ -241,7 +241,7 @@ def test_other_numbers_of_disks_are_refused(model, disks):
 
 
 def test_no_network_starts_from_a_process(folder, store):
-    with pytest.raises(BadCheckpoint, match="a Gaussian process; give the folder"):
+    with pytest.raises(BadCheckpoint, match="card.json: not found: this is no network"):
         sn.tune("sain", store, start=folder, iterations=1)
 
 

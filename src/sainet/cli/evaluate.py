@@ -43,11 +43,9 @@ class Evaluate:
         if self.table is not None:
             require_one_of("table", self.table.suffix, WRITERS)
         use_devices(self.devices)
-        from msgspec import to_builtins
-
         from sainet.datasets.store import open_store
         from sainet.evaluation.as_json import to_json_object
-        from sainet.evaluation.coverage import coverage_of, in_words
+        from sainet.evaluation.coverage import coverage_of, in_words, to_json
         from sainet.evaluation.evaluate import evaluate
         from sainet.evaluation.summary import summarise
         from sainet.models.library import load_model, other_worlds
@@ -78,8 +76,7 @@ class Evaluate:
             self.output.say(sentence)
         if self.table is not None:
             write_table(arrange(summary), self.table)
-        found = to_json_object(summary)
-        return found | ({"coverage": to_builtins(covered)} if covered else {})
+        return to_json_object(summary) | to_json(covered)
 
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit; warn of the others."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
+from sainet.learning.recipes import FROM_ENGINE
 from sainet.models.identity import Features
 from sainet.runs.documents import checked
 from sainet.runs.errors import BadSetting
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 Given = Mapping[str, object]
 _OF_PROCESSES = {"features", "iterations", "seed"}
+_UNUSED = {"start": FROM_ENGINE, "devices": None}  # options, as they are without use
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def _settings(changes: Given, usual: Given) -> "ProcessSettings":
     from sainet.models.process_card import ProcessSettings
 
     for name, value in changes.items():
-        if name not in _OF_PROCESSES and value != usual[name]:
+        if name not in _OF_PROCESSES and value != {**usual, **_UNUSED}[name]:
             raise BadSetting(name, value, "left out: it is a setting of networks")
     given = {name: changes[name] for name in _OF_PROCESSES & changes.keys()}
     return checked(ProcessSettings(**cast(Any, given)), "gp")

@@ -11,9 +11,6 @@ from sainet.cli.process import ProcessJob, for_networks
 from sainet.cli.train import Job
 from sainet.learning.recipes import FROM_ENGINE, RESIDUAL, recipe_for, start_named
 from sainet.models.identity import Features, ModelKind, ProcessFeatures
-from sainet.runs.errors import require
-
-_OF_NETWORKS = "left out: it is a setting of networks"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +95,7 @@ class Tune:
         given = {k: v for k, v in asdict(self.changes).items() if v is not None}
         job = self.data, self.out, self.engine, self.group, self.pushes
         if self.model == "gp":
-            require(self.start == FROM_ENGINE, "start", _OF_NETWORKS, self.start)
-            require(self.devices is None, "devices", _OF_NETWORKS, self.devices)
+            given |= {"start": self.start, "devices": self.devices}
             return ProcessJob(*job).run(given, asdict(Changes()), self.output)
         recipe = recipe_for(start_named(self.start)).changed(**for_networks(given))
         return Job(

@@ -125,8 +125,18 @@ HEADINGS = (
 )
 
 
-def cells(found: Coverage) -> list[str]:
-    """Return the cells of a table of coverage, below `HEADINGS`."""
+def rows_of(measured: Measurements, conditions: Sequence[str]) -> list[list[str]]:
+    """Return the coverage in some conditions, in their order, below `HEADINGS`."""
+    found = coverage_of(measured)
+    return [_cells(e) for label in conditions for e in found if e.condition == label]
+
+
+def to_json(found: Sequence[Coverage]) -> dict[str, object]:
+    """Return coverage as a part of a JSON object; nothing where there is none."""
+    return {"coverage": msgspec.to_builtins(found)} if found else {}
+
+
+def _cells(found: Coverage) -> list[str]:
     unit = "°" if found.kind == "rot" else " mm"
     ends = [found.inside, found.size, found.score, found.over_plain]
     digits = [1, 2, 2, 2]

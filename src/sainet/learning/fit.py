@@ -33,10 +33,9 @@ from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.identity import ModelId, ModelKind, TrainingData
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
-from sainet.models.process_card import is_process
 from sainet.runs.digests import digests_from_text, digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document
-from sainet.runs.errors import BadCheckpoint, Diverged, UnknownName
+from sainet.runs.errors import Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
@@ -128,10 +127,6 @@ def _existing(start: Start) -> Existing | None:
             "network."
         )
     folder = network_folder(name)
-    if is_process(folder):
-        raise BadCheckpoint(
-            f"`start` is {name!r}, a Gaussian process; give the folder of a network."
-        )
     return Existing(*load_network(folder), folder)
 
 

@@ -1,7 +1,7 @@
 """Documents of models: cards of networks, and identified parameters."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import msgspec
 
@@ -53,6 +53,9 @@ class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 class Card(msgspec.Struct, frozen=True, kw_only=True):
     """Metadata that restricts a network's use."""
+
+    file: ClassVar[str] = CARD
+    noun: ClassVar[str] = "network"
 
     identity: ModelId
     kind: Literal["robot", "direct-force"]  # setup of the pushes
@@ -108,8 +111,8 @@ def read_card(folder: Path) -> Card:
         raise BadCheckpoint(f"{folder}: no such network; make one with 'sainet train'.")
     if not path.is_file():
         raise BadCheckpoint(
-            f"{path}: not found: training did not finish; run the same command again "
-            "to resume it."
+            f"{path}: not found: this is no network, or its training did not finish; "
+            "run the same command again to resume it."
         )
     return read_document(path, Card, error=BadCheckpoint, remedy="train it again")
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt64
 
 from sainet.engines.simulator import InternalEngine
-from sainet.models.card import CARD, Card, Identified
+from sainet.models.card import Card, Identified
 from sainet.models.dynamics import SAME_TIME, AbstractDynamics, check_purpose, predict
 from sainet.models.identity import ModelId
 from sainet.models.process_card import ProcessCard
@@ -129,7 +129,7 @@ class Model:
         """
         if self.card is None:
             return
-        path = f"{self.folder}/{CARD}" if self.folder else self.name
+        path = f"{self.folder}/{self.card.file}" if self.folder else self.name
         if self.card.kind != kind:
             raise BadCheckpoint(
                 f"{path}: kind is {self.card.kind!r}, the data's is "
@@ -149,6 +149,7 @@ class Model:
         seen = 0 if pushes is None else pushes_overlap(self.card.pushes, pushes)
         if pushes is not None and seen:
             raise BadCheckpoint(
-                f"{path}: the network was trained on {seen} of these {len(pushes)} "
-                "pushes. Test it on others ('sainet split'), or give `force`."
+                f"{path}: the {self.card.noun} was trained on {seen} of these "
+                f"{len(pushes)} pushes. Test it on others ('sainet split'), or give "
+                "`force`."
             )

@@ -1,7 +1,7 @@
 """Gaussian processes on disk: their card, and their arrays in a file of their own."""
 
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -47,6 +47,9 @@ class ProcessSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
     """Metadata that restricts a process's use; fields of `Card` mean the same."""
+
+    file: ClassVar[str] = PROCESS
+    noun: ClassVar[str] = "Gaussian process"
 
     identity: ModelId
     kind: Literal["robot"]

@@ -4,14 +4,33 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from sainet.engines import RECORDED
-from sainet.learning.log import LogLine
-from sainet.models.card import Card
-from sainet.models.process_card import ProcessCard
+from sainet.learning.log import LogLine, read_log
+from sainet.models.card import CARD, Card, read_card
+from sainet.models.process_card import ProcessCard, is_process, read_process_card
 
 _SETUPS = {
     "robot": "a pusher that follows a path",
     "direct-force": "a pusher that a force drives",
 }
+
+
+def read_any_card(folder: Path) -> Card | ProcessCard | None:
+    """Return the card of the trained model in a folder; None where there is none.
+
+    Raises:
+        BadCheckpoint: it is damaged.
+    """
+    if is_process(folder):
+        return read_process_card(folder)
+    return read_card(folder) if (folder / CARD).is_file() else None
+
+
+def sentences_of(folder: Path) -> list[str]:
+    """Return what the trained model in a folder is; nothing where there is none."""
+    card = read_any_card(folder)
+    if isinstance(card, ProcessCard):
+        return [*of_process(card, folder)]
+    return [*of_network(card, read_log(folder), folder)] if card else []
 
 
 def of_network(card: Card, history: Sequence[LogLine], folder: Path) -> Iterator[str]:

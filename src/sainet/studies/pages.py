@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 import jinja2
 
 from sainet.evaluation.claims import places
-from sainet.evaluation.coverage import HEADINGS, Coverage, cells, coverage_of
+from sainet.evaluation.coverage import HEADINGS, rows_of
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
 from sainet.report.palette import labels_of
@@ -58,8 +58,8 @@ def helpers(evidence: Evidence) -> dict[str, object]:
     summary = evidence.summary
     return {
         "summary": summary,
-        "coverage": lambda name, *conditions: coverage(
-            coverage_of(evidence.measured(name)), conditions
+        "coverage": lambda name, *labels: _table(
+            HEADINGS, rows_of(evidence.measured(name), labels), align=":--"
         ),
         "table": lambda name: to_markdown(arrange(summary(name))),
         "origin": lambda name: origin(summary(name)),
@@ -77,12 +77,6 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "bench": lambda case: bench(evidence.benchmark(case)),
         "figure": lambda case, name: evidence.benchmark(case).figures[name],
     }
-
-
-def coverage(found: Sequence[Coverage], conditions: Sequence[str]) -> str:
-    """Return the coverage in some conditions, in their order, as a table."""
-    rows = (e for label in conditions for e in found if e.condition == label)
-    return _table(HEADINGS, map(cells, rows), align=":--")
 
 
 def trainings(summary: Summary) -> str:

@@ -7,17 +7,8 @@ from typing import Any
 import msgspec
 
 from sainet.control.record import episode_files, read_record
-from sainet.learning.log import read_log
-from sainet.models.card import (
-    CARD,
-    IDENTIFIED,
-    Card,
-    Identified,
-    read_card,
-    read_identified,
-)
-from sainet.models.process_card import ProcessCard, is_process, read_process_card
-from sainet.report.about_models import of_network, of_process
+from sainet.models.card import CARD, IDENTIFIED, Identified, read_identified
+from sainet.report.about_models import read_any_card, sentences_of
 from sainet.report.pages.page import REPORT, Report, to_page
 from sainet.report.writers import estimate_cells, estimate_sentences
 from sainet.runs.documents import read_document, read_json
@@ -50,10 +41,11 @@ def report_of(folder: Path) -> Report:
         raise BadInput(f"{folder}: no such folder; give one that sainet made.")
     found = folder / TABLE
     table = read_document(found, Result).summary if found.is_file() else None
-    card = msgspec.to_builtins(_card(folder))
+    card = msgspec.to_builtins(read_any_card(folder)) or {}
     card.pop("pushes", None)  # hashes, which no reader compares
     is_identified = (folder / IDENTIFIED).is_file()
-    sentences = _sentences(folder)
+    estimates = _estimates(read_identified(folder)) if is_identified else ()
+    sentences = (*sentences_of(folder), *estimates)
     episodes = [read_record(path) for path in episode_files(folder)[:_EPISODES]]
     figures = tuple(_figures(folder))
     if not (table or card or is_identified or episodes or figures):
@@ -112,22 +104,6 @@ def _estimates(identified: Identified) -> Iterator[str]:
             name, before, value, interval = estimate_cells(estimate)
             yield f"{name.capitalize()}: {value} ({interval}), initially {before}."
     yield from estimate_sentences(identified)
-
-
-def _card(folder: Path) -> Card | ProcessCard | dict[str, object]:
-    if is_process(folder):
-        return read_process_card(folder)
-    return read_card(folder) if (folder / CARD).is_file() else {}
-
-
-def _sentences(folder: Path) -> Iterator[str]:
-    card = _card(folder)
-    if isinstance(card, Card):
-        yield from of_network(card, read_log(folder), folder)
-    elif isinstance(card, ProcessCard):
-        yield from of_process(card, folder)
-    elif (folder / IDENTIFIED).is_file():
-        yield from _estimates(read_identified(folder))
 
 
 def _way_out(folder: Path) -> str:
