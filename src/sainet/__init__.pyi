@@ -16,6 +16,8 @@ from sainet.api.pushes import Pushes as Pushes
 from sainet.api.pushes import generate as generate
 from sainet.api.pushes import open_pushes as open_pushes
 from sainet.api.table import ErrorTable as ErrorTable
+from sainet.api.validation import CrossValidation as CrossValidation
+from sainet.api.validation import cross_validate as cross_validate
 from sainet.control.config import ControlConfig as ControlConfig
 from sainet.control.episode import run_episode as run_episode
 from sainet.control.gym.policy import GreedyPlanner as GreedyPlanner

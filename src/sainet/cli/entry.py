@@ -13,6 +13,7 @@ from tyro.conf import subcommand
 import sainet
 from sainet.cli.bench import Bench
 from sainet.cli.control import Control
+from sainet.cli.cross_validate import CrossValidate
 from sainet.cli.datasets import AddBystander, Generate, Import, Split
 from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
@@ -40,6 +41,7 @@ _COMMANDS = {
     "tune": Tune,
     "evaluate": Evaluate,
     "identify": Identify,
+    "cross-validate": CrossValidate,
     "control": Control,
     "reproduce": Reproduce,
     "report": MakeReport,
@@ -57,7 +59,10 @@ Start with 'sainet demo', which runs the whole method at small scale."""
 
 INTERRUPTED = 130
 # Commands that an identical call resumes.
-_RESUMABLE = (Demo, Generate, Record, Import, Split, Train, Tune, Control, Reproduce)
+_RESUMABLE = (
+    *(Demo, Generate, Record, Import, Split, Train, Tune, Control, Reproduce),
+    CrossValidate,
+)
 
 
 def parse(words: Sequence[str]) -> Any:  # noqa: ANN401

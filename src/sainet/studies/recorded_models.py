@@ -61,7 +61,9 @@ def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
     known = [name.rpartition("-")[0] or name for name in store.info.groups]
     groups = known or ["recorded"]
     owner = np.array(groups)[store.read(slice(None), ("group",))["group"]]
-    return {name: np.flatnonzero(owner == name) for name in dict.fromkeys(groups)}
+    present = set(owner.tolist())
+    names = (name for name in dict.fromkeys(groups) if name in present)
+    return {name: np.flatnonzero(owner == name) for name in names}
 
 
 class AroundIdentified(Step[Model]):

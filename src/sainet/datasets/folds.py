@@ -1,0 +1,93 @@
+"""Ways to divide recorded pushes into folds: what a model's test pushes lack.
+
+By kind of push, folds leave out whole sets of repeats, and by chain also what a chain
+links to them. Blocked folds leave out a part of the table, of the directions, of the
+sides of the disk or of the time of recording, so that a model must extrapolate.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Literal, get_args
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from sainet.datasets.schema import Arrays
+from sainet.datasets.splits import fold_of_push, linked
+from sainet.datasets.store import Store
+from sainet.runs.errors import BadStore
+
+Scheme = Literal["kind", "chain", "place", "direction", "side", "order"]
+SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
+BLOCKED: tuple[Scheme, ...] = ("place", "direction", "side", "order")
+
+
+def folds_by(
+    store: Store, scheme: Scheme, count: int, rows: Int[np.ndarray, " some"]
+) -> Int[np.ndarray, " some"]:
+    """Return the fold of some pushes, from 0.
+
+    Args:
+        store: of all pushes; repeats and chains are looked for in all of them.
+        scheme: how the pushes are divided.
+        count: of the folds.
+        rows: of the pushes; blocks are of them alone.
+
+    Raises:
+        BadStore: the pushes do not suffice for so many folds.
+    """
+    if scheme in _KINDS:
+        kinds = _KINDS[scheme](store)
+        owner, parts = fold_of_push(kinds, count)[rows], len(np.unique(kinds[rows]))
+    else:
+        part = store.take(rows)
+        owner = _blocks(_values(part, scheme), count)
+        parts = part.info.pushes
+    if len(np.unique(owner)) < count:
+        raise BadStore(
+            f"{store.path}: {len(rows)} pushes, {parts} to divide by {scheme}, do not "
+            f"fill {count} folds; take fewer folds, another division or more pushes."
+        )
+    return owner
+
+
+_KINDS: Mapping[Scheme, Callable[[Store], Int[np.ndarray, " push"]]] = {
+    "kind": Store.repeats,
+    "chain": linked,
+}
+
+
+def _values(store: Store, scheme: Scheme) -> Float[np.ndarray, " push"]:
+    """Return a number for each push; blocks are ranges of it."""
+    names = ("initial", "initial_pusher", "command_position", "steps")
+    arrays = store.read(slice(None), names)
+    place = arrays["initial"][:, 0, :2]
+    if scheme == "place":
+        return place @ _longest_axis(place)
+    if scheme == "order":
+        return np.arange(len(place), dtype=float)
+    return _direction(arrays) if scheme == "direction" else _side(arrays)
+
+
+def _direction(arrays: Arrays) -> Float[np.ndarray, " push"]:
+    """Return the direction of the pusher's path (rad)."""
+    start = arrays["initial_pusher"]
+    last = arrays["command_position"][np.arange(len(start)), arrays["steps"] - 1]
+    return np.arctan2(*(last - start).T[::-1])
+
+
+def _side(arrays: Arrays) -> Float[np.ndarray, " push"]:
+    """Return where on its circumference the disk is pushed, from 0 to 2 pi (rad)."""
+    disk = arrays["initial"][:, 0, :3]
+    normal = disk[:, :2] - arrays["initial_pusher"]
+    return np.mod(np.arctan2(normal[:, 1], normal[:, 0]) - disk[:, 2], 2 * np.pi)
+
+
+def _blocks(values: Float[np.ndarray, " push"], count: int) -> Int[np.ndarray, " push"]:
+    """Return the fold of each push: neighbouring values share one, sizes are equal."""
+    order = np.argsort(np.argsort(values, kind="stable"), kind="stable")
+    return order * count // len(values)
+
+
+def _longest_axis(places: Float[np.ndarray, "push 2"]) -> Float[np.ndarray, "2"]:
+    """Return the direction in which places are spread most."""
+    return np.linalg.svd(places - places.mean(axis=0), full_matrices=False)[2][0]

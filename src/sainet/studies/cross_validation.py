@@ -1,0 +1,251 @@
+"""Cross-validation: models fitted to some recorded pushes predict the others.
+
+Everything that is fitted is fitted inside a fold: the identified parameters, the
+scales of inputs and outputs, hyperparameters, weights, and the quantiles of regions. A
+surface has models of its own, like a robot at one table.
+"""
+
+import abc
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Literal, get_args
+
+import jax
+from msgspec import structs
+
+from sainet.datasets.folds import Scheme, folds_by
+from sainet.datasets.splits import folds_of
+from sainet.datasets.store import Store
+from sainet.engines.simulator import InternalEngine
+from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.joining import join
+from sainet.evaluation.measurements import Condition, Measurements, read_measurements
+from sainet.identification.identify import identify_into
+from sainet.learning.fit import fit
+from sainet.learning.process import fit_process
+from sainet.learning.recipes import RESIDUAL
+from sainet.models.card import read_identified
+from sainet.models.identity import Features, ModelId, ProcessFeatures
+from sainet.models.library import load_model
+from sainet.models.model import Model
+from sainet.models.process_card import ProcessSettings
+from sainet.runs.errors import unknown_name
+from sainet.studies.recorded_models import IDENTIFIED, surfaces_of
+from sainet.studies.recorded_pushes import JoinFolds
+from sainet.studies.runner import Runner
+from sainet.studies.steps import Apart, Given, Step
+from sainet.studies.study import MEASUREMENTS
+
+PHYSICS_IDENTIFIED = ModelId(kind="physics", simulator=IDENTIFIED)
+
+
+class FitEngine(Apart[Model]):
+    """Physics with parameters identified on some pushes."""
+
+    pushes: Given
+
+    def work(self, folder: Path) -> None:
+        """Identify the parameters."""
+        identify_into(self.pushes.store, folder)
+
+    def run(self, runner: Runner) -> Model:
+        """Return the model, identified where that is unfinished."""
+        self.work(runner.folder(self))
+        return self.model_in(runner.out)
+
+    def model_in(self, out: Path) -> Model:
+        """Return the model of a finished folder, among those of a runner."""
+        found = load_model(str(out / self.folder_name))
+        return replace(found, id=PHYSICS_IDENTIFIED)
+
+
+@dataclass(frozen=True)
+class Candidate(abc.ABC):
+    """A model that learns what the identified engine gets wrong."""
+
+    @property
+    @abc.abstractmethod
+    def identity(self) -> ModelId:
+        """The identity in tables."""
+
+    @abc.abstractmethod
+    def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
+        """Fit the model to pushes, around an engine, unless the folder has it."""
+
+
+@dataclass(frozen=True)
+class ProcessCandidate(Candidate):
+    """A Gaussian process."""
+
+    features: ProcessFeatures
+
+    @property
+    def identity(self) -> ModelId:
+        """The identity in tables."""
+        return ModelId(kind="gp", simulator=IDENTIFIED, features=self.features)
+
+    def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
+        """Fit the process."""
+        settings = ProcessSettings(features=self.features)
+        fit_process(store, folder, internal, settings)
+
+
+@dataclass(frozen=True)
+class NetworkCandidate(Candidate):
+    """An additive network around the engine."""
+
+    features: Features
+
+    @property
+    def identity(self) -> ModelId:
+        """The identity in tables."""
+        return ModelId(
+            kind="sain", simulator=IDENTIFIED, data="residual", features=self.features
+        )
+
+    def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
+        """Train the network."""
+        batch = min(RESIDUAL.optimiser.batch_size, store.info.pushes)
+        recipe = RESIDUAL.changed(features=self.features, batch_size=batch)
+        fit("sain", store, recipe, folder, assumed_engine=internal)
+
+
+CandidateName = Literal["gp-angle", "gp-side", "gp-place", "sain", "sain-place"]
+# From the simplest to the one that needs most: the same table and the same disk.
+CANDIDATES: Mapping[str, Candidate] = MappingProxyType(
+    {
+        "gp-angle": ProcessCandidate("angle"),
+        "sain": NetworkCandidate("paper"),
+        "gp-side": ProcessCandidate("side"),
+        "sain-place": NetworkCandidate("place"),
+        "gp-place": ProcessCandidate("place"),
+    }
+)
+NAMES: tuple[CandidateName, ...] = get_args(CandidateName)
+
+
+def candidates_named(names: Sequence[str]) -> tuple[Candidate, ...]:
+    """Return candidates, from the simplest.
+
+    Raises:
+        UnknownName: there is no candidate of a name.
+    """
+    for name in names:
+        if name not in CANDIDATES:
+            raise unknown_name("candidate", name, CANDIDATES)
+    return tuple(each for name, each in CANDIDATES.items() if name in names)
+
+
+class FitCandidate(Apart[Model]):
+    """A candidate fitted to some pushes, around the engine identified on them."""
+
+    engine: FitEngine
+    candidate: Candidate
+
+    @property
+    def name(self) -> str:
+        """The name in tables."""
+        return self.candidate.identity.slug
+
+    def work(self, folder: Path) -> None:
+        """Fit the model."""
+        identified = read_identified(folder.parent / self.engine.folder_name)
+        pushes = self.engine.pushes.store
+        self.candidate.fit(pushes, identified.engine, folder)
+        jax.clear_caches()  # of programs for so many pushes; hundreds crash XLA
+
+    def run(self, runner: Runner) -> Model:
+        """Return the model, fitted where that is unfinished."""
+        self.work(runner.folder(self))
+        return self.model_in(runner.out)
+
+    def model_in(self, out: Path) -> Model:
+        """Return the model of a finished folder, among those of a runner."""
+        found = load_model(str(out / self.folder_name))
+        return replace(found, id=self.candidate.identity)
+
+
+class EvaluateFitted(Apart[Measurements]):
+    """Errors and regions of all models on pushes that they were not fitted to."""
+
+    engine: FitEngine
+    fitted: tuple[FitCandidate, ...]
+    pushes: Given
+    condition: Condition
+
+    def work(self, folder: Path) -> None:
+        """Predict the pushes, and write the measurements."""
+        if (folder / MEASUREMENTS).is_file():
+            return
+        models = (each.model_in(folder.parent) for each in (self.engine, *self.fitted))
+        found = evaluate((load_model("physics"), *models), self.pushes.store)
+        folder.mkdir(parents=True, exist_ok=True)
+        found.write(folder / MEASUREMENTS)
+        jax.clear_caches()  # each fold compiles programs of its own
+
+    def run(self, runner: Runner) -> Measurements:
+        """Return the errors."""
+        folder = runner.folder(self)
+        self.work(folder)
+        return read_measurements(folder / MEASUREMENTS).in_condition(self.condition)
+
+
+class WithUnions(Step[Measurements]):
+    """Measurements of all conditions, and of some of them together."""
+
+    parts: tuple[Step[Measurements], ...]
+    unions: tuple[Condition, ...]
+
+    def run(self, runner: Runner) -> Measurements:
+        """Return the measurements of all parts."""
+        whole = join([runner.result(part) for part in self.parts])
+        conditions = whole.header.conditions + self.unions
+        header = structs.replace(whole.header, conditions=conditions)
+        return replace(whole, header=header)
+
+
+def fitted_and_tested(
+    training: Store, tests: Store, condition: Condition, models: Sequence[Candidate]
+) -> EvaluateFitted:
+    """Return the step that fits the engine and models to pushes and tests them."""
+    engine = FitEngine(Given(training))
+    fitted = tuple(FitCandidate(engine, each) for each in models)
+    return EvaluateFitted(engine, fitted, Given(tests), condition)
+
+
+def cross_validated(
+    store: Store, schemes: Sequence[Scheme], count: int, models: Sequence[Candidate]
+) -> tuple[list[Step[Measurements]], list[Condition]]:
+    """Return the measurements of each division and surface, and their unions.
+
+    Args:
+        store: recorded pushes.
+        schemes: how they are divided into folds, each a condition.
+        count: of the folds.
+        models: to fit, beside the engine.
+
+    Raises:
+        BadStore: the pushes do not suffice for so many folds.
+    """
+    surfaces = surfaces_of(store)
+    parts: list[Step[Measurements]] = []
+    unions: list[Condition] = []
+    for scheme in schemes:
+        labels = {
+            s: f"{scheme}, {s}" if len(surfaces) > 1 else scheme for s in surfaces
+        }
+        for surface, rows in surfaces.items():
+            factors: dict[str, float | str] = {"folds": scheme, "surface": surface}
+            condition = Condition(label=labels[surface], factors=factors)
+            owner = folds_by(store, scheme, count, rows)
+            folds = tuple(folds_of(store, rows, owner, count))
+            tests = (
+                fitted_and_tested(each.training, each.tests, condition, models)
+                for each in folds
+            )
+            parts.append(JoinFolds(tuple(tests), folds, condition))
+        if len(surfaces) > 1:
+            unions.append(Condition(label=scheme, parts=tuple(labels.values())))
+    return parts, unions

@@ -1,0 +1,77 @@
+"""Divisions of recorded pushes into folds: what test pushes lack."""
+
+import numpy as np
+import pytest
+
+from learning.stores import info_of, made_up, write
+from sainet.datasets.folds import BLOCKED, SCHEMES, folds_by
+from sainet.datasets.splits import linked
+from sainet.runs.errors import BadStore
+
+PUSHES, FOLDS = 40, 4
+EVERY = np.arange(PUSHES)
+
+
+def spread(seed=0, turned=0.0):
+    """Pushes of one disk all over the table, from all sides, in all directions."""
+    rng = np.random.default_rng(seed)
+    info = info_of(PUSHES, bodies=1, has_repeats=True)
+    arrays = made_up(info, seed=seed)
+    place = rng.uniform([-0.3, -0.05], [0.3, 0.05], (PUSHES, 2))
+    angle, side, ahead = rng.uniform(-np.pi, np.pi, (3, PUSHES))
+    normal = np.stack([np.cos(side + angle), np.sin(side + angle)], axis=-1)
+    pusher = place - 0.06 * normal
+    heading = np.stack([np.cos(ahead), np.sin(ahead)], axis=-1)
+    path = pusher[:, None] + 0.001 * np.arange(1, 13)[:, None] * heading[:, None]
+    initial = np.zeros((PUSHES, 1, 6))
+    initial[:, 0, :2], initial[:, 0, 2] = place, angle
+    arrays |= {"initial": initial, "initial_pusher": pusher, "command_position": path}
+    values = {"place": place[:, 0], "direction": ahead, "side": np.mod(side, 2 * np.pi)}
+    arrays |= {"repeat": np.arange(PUSHES) // 2}
+    return info, arrays, values | {"order": EVERY}
+
+
+@pytest.fixture(scope="module")
+def spread_out(tmp_path_factory):
+    info, arrays, values = spread()
+    return write(tmp_path_factory.mktemp("spread") / "data", info, arrays), values
+
+
+@pytest.mark.parametrize("scheme", BLOCKED)
+def test_blocks_are_ranges_of_equal_size(spread_out, scheme):
+    store, values = spread_out
+    owner = folds_by(store, scheme, FOLDS, EVERY)
+    assert np.bincount(owner).tolist() == [PUSHES // FOLDS] * FOLDS
+    ends = sorted(
+        (values[scheme][owner == n].min(), values[scheme][owner == n].max())
+        for n in range(FOLDS)
+    )
+    assert all(high < low for (_, high), (low, _) in zip(ends, ends[1:], strict=False))
+
+
+def test_repeats_and_chains_stay_together(tmp_path):
+    info, arrays, _ = spread()
+    # Push 3 starts where push 10 ended: a chain of two pairs of repeats.
+    arrays["initial"][3] = arrays["truth"][10, -1]
+    store = write(tmp_path / "data", info, arrays)
+    assert linked(store)[3] == linked(store)[10]
+    for scheme, together in (("kind", [2, 3]), ("chain", [2, 3, 10, 11])):
+        owner = folds_by(store, scheme, FOLDS, EVERY)
+        assert len(set(owner[together])) == 1
+        assert set(owner) == set(range(FOLDS))
+
+
+def test_a_part_has_the_kinds_of_the_whole_and_blocks_of_its_own(spread_out):
+    store, _ = spread_out
+    rows = np.arange(5, 35)
+    kinds = folds_by(store, "kind", FOLDS, EVERY)
+    assert (folds_by(store, "kind", FOLDS, rows) == kinds[rows]).all()
+    sizes = np.bincount(folds_by(store, "place", FOLDS, rows))
+    assert sizes.min() >= len(rows) // FOLDS
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_too_few_pushes_are_refused(spread_out, scheme):
+    store, _ = spread_out
+    with pytest.raises(BadStore, match=rf"2 pushes.*by {scheme}.*fewer folds"):
+        folds_by(store, scheme, 3, EVERY[:2])

@@ -1,0 +1,146 @@
+"""`sainet cross-validate`: nothing of a test push is used in a fit; the command."""
+
+import contextlib
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+
+import sainet as sn
+from learning.stores import end_points_alone, info_of, made_up, write
+from sainet.cli.entry import run
+from sainet.datasets.store import open_store
+from sainet.models.card import read_identified
+from sainet.models.process_card import read_process_card
+from sainet.runs.digests import pushes_overlap
+from sainet.runs.errors import BadStore
+from sainet.studies.cross_validation import (
+    ProcessCandidate,
+    candidates_named,
+    cross_validated,
+)
+
+PUSHES, FOLDS = 48, 2
+MODELS = ("physics", "physics-identified", "gp-identified-angle")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Pushes of one disk on two surfaces, in pairs of repeats."""
+    groups = ("felt", "wood")
+    info = info_of(
+        PUSHES, engine="recorded", seed=None, bodies=1, groups=groups, has_repeats=True
+    )
+    arrays = end_points_alone(made_up(info))
+    arrays |= {"group": np.repeat([0, 1], PUSHES // 2)}
+    arrays |= {"repeat": np.repeat(np.arange(PUSHES // 2), 2)}
+    frictions = dict.fromkeys(
+        ("table_friction", "disk_friction", "pusher_friction"), np.full(PUSHES, 0.3)
+    )
+    folder = tmp_path_factory.mktemp("recorded") / "data"
+    return write(folder, info, arrays | frictions).path
+
+
+@pytest.fixture(scope="module")
+def command(recorded, tmp_path_factory):
+    """The words of a small cross-validation, and its folder."""
+    out = tmp_path_factory.mktemp("validated") / "out"
+    given = ["--data", str(recorded), "--out", str(out), "--folds", str(FOLDS)]
+    chosen = ["--models", "gp-angle", "--by", "kind", "--json", "--quiet"]
+    given += ["--group", "wood"]
+    return ["cross-validate", *given, *chosen], out
+
+
+@pytest.fixture(scope="module")
+def printed(command):
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
+        assert run(command[0]) == 0
+    return json.loads(text.getvalue())
+
+
+def test_each_push_is_tested_once_by_models_that_did_not_see_it(recorded):
+    store = open_store(recorded)
+    models = candidates_named(["gp-angle"])
+    parts, unions = cross_validated(store, ("kind",), FOLDS, models)
+    assert [condition.parts for condition in unions] == [("kind, felt", "kind, wood")]
+    hashes, tested = store.push_hashes(), []
+    for part in parts:
+        for step in part.parts:
+            seen = step.engine.pushes.store
+            assert {each.engine for each in step.fitted} == {step.engine}
+            assert not set(seen.repeats()) & set(step.pushes.store.repeats())
+            assert len(set(seen.read(slice(None), ("group",))["group"])) == 1
+            tested += step.pushes.store.push_hashes().tolist()
+    assert sorted(tested) == sorted(hashes.tolist())
+
+
+def test_the_command_gives_verdict_errors_and_page(printed, command):
+    out = command[1]
+    assert printed["verdict"].endswith(".")
+    assert printed["recommendation"]["model"] in MODELS
+    assert (out / "measurements.nc").is_file()
+    page = (out / "report.html").read_text()
+    assert "Is learning worth it" in page
+    assert printed["page"] == str(out / "report.html")
+
+
+def test_the_models_of_a_fold_were_fitted_to_its_training_pushes(
+    printed, command, recorded
+):
+    store, cards = open_store(recorded), []
+    for folder in sorted((command[1] / "steps").glob("gp-*")):
+        cards.append(read_process_card(folder))
+    assert len(cards) == FOLDS
+    for card in cards:
+        seen = pushes_overlap(card.pushes, store.push_hashes())
+        assert seen == card.trained_pushes < PUSHES / 2
+
+
+def test_an_identical_command_fits_nothing_again(printed, command, capsys):
+    steps = command[1] / "steps"
+    before = {p: p.stat().st_mtime_ns for p in steps.rglob("*") if p.is_file()}
+    assert run(command[0]) == 0
+    assert json.loads(capsys.readouterr().out) == printed
+    assert {p: p.stat().st_mtime_ns for p in before} == before
+    engines = [read_identified(folder) for folder in steps.glob("fitengine-*")]
+    assert len(engines) == FOLDS
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--folds", "1"], "folds.*at least 2"),
+        (["--folds", "13"], "24 pushes, 12 to divide by kind, do not fill 13 folds"),
+        (["--group", "glass"], "no group 'glass'"),
+        (["--pushes", "99"], "24 pushes, not 99"),
+        (["--table", "errors.doc"], "table.*\\.md"),
+    ],
+)
+def test_bad_settings_end_in_one_line(command, options, message, capsys):
+    words = [*command[0], *options]
+    assert run(words) == 2
+    error = capsys.readouterr().err.strip()
+    assert error.count("\n") == 0
+    assert re.search(message, error)
+
+
+def test_a_script_gives_the_same_verdict(recorded, command, printed):
+    found = sn.cross_validate(
+        sn.open_pushes(recorded).of_group("wood"),
+        by="kind",
+        folds=FOLDS,
+        models=("gp-angle",),
+        out=command[1],
+    )
+    assert found.verdict() == printed["verdict"]
+    assert "Physics" in str(found)
+    with pytest.raises(BadStore, match="do not fill"):
+        sn.cross_validate(recorded, folds=PUSHES)
+
+
+def test_candidates_come_from_the_simplest():
+    found = candidates_named(["gp-place", "gp-angle"])
+    assert found == (ProcessCandidate("angle"), ProcessCandidate("place"))
