@@ -228,6 +228,7 @@ VALIDATION = (
     "cli/cross_validate",
     "api/validation",
 )
+ADAPTATION = ("identification/adaptation", "studies/adaptation")
 
 
 def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
@@ -236,15 +237,18 @@ def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
 
 
 ADDED = modules_of(ROBOTS)
-LATER = ADDED + modules_of(WAY_IN + TRUST + VALIDATION)
+LATER = ADDED + modules_of(WAY_IN + TRUST + VALIDATION + ADAPTATION)
 REBUILT = [path for path in MODULES if path not in LATER]
-# Lines in older modules that connect Gaussian processes, regions and coverage to them.
-CONNECTIONS = 85
+# Lines in older modules that connect later features to them.
+CONNECTIONS = {
+    "Gaussian processes, regions and coverage": 85,
+    "adaptation": 25,
+}
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
-        lambda: sum(map(code_lines, REBUILT)) - CONNECTIONS,
+        lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
         15_450,
         11_000,
     ),
@@ -278,6 +282,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(VALIDATION))),
         600,
         600,
+    ),
+    "code lines of adaptation": (
+        lambda: sum(map(code_lines, modules_of(ADAPTATION))),
+        250,
+        250,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

@@ -105,7 +105,7 @@ def test_an_identical_command_fits_nothing_again(printed, command, capsys):
     assert run(command[0]) == 0
     assert json.loads(capsys.readouterr().out) == printed
     assert {p: p.stat().st_mtime_ns for p in before} == before
-    engines = [read_identified(folder) for folder in steps.glob("fitengine-*")]
+    engines = [read_identified(folder) for folder in steps.glob("identify-*")]
     assert len(engines) == FOLDS
 
 

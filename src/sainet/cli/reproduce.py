@@ -27,13 +27,13 @@ class Reproduce:
     studies: Positional[tuple[str, ...]] = ()
     """Studies: direct-force-two-disks (the paper's Table I), direct-force-three-disks
     (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
-    regularisation and robustness, with the networks of Table III; simulated-control,
-    with shipped networks; robot-planar; engine-parity; pretrained (the shipped
-    networks); fine-tuning (settings chosen on simulated pushes); recorded-pushes,
-    recorded-trust, recorded-data-efficiency and lab-realism, which need --recorded;
-    lab-collect, lab-prediction (Table IV), lab-control, lab-new-surface and
-    lab-swapped-disks, in virtual labs. Default: every study whose requirements are
-    met."""
+    regularisation and robustness, with the networks of Table III; simulated-control and
+    adaptation, with shipped networks; robot-planar; engine-parity; pretrained (the
+    shipped networks); fine-tuning (settings chosen on simulated pushes);
+    recorded-pushes, recorded-trust, recorded-data-efficiency and lab-realism, which
+    need --recorded; lab-collect, lab-prediction (Table IV), lab-control,
+    lab-new-surface and lab-swapped-disks, in virtual labs. Default: every study whose
+    requirements are met."""
     scale: Scale = "quick"
     """Size of datasets and training runs: quick for minutes per study, paper for 4,500
     pushes and 10,000 iterations per network."""

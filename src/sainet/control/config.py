@@ -22,6 +22,7 @@ _COUNTS = {
     "seed": (0, LARGEST_COUNT),
 }
 _LEAST_TOLERANCE = 1e-6  # of a radius
+_MOST_WRONG = 0.5  # fraction of masses and radii
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +47,12 @@ class ControlConfig(RobotConfig):
     """Masses and radii given to the network: true, or assumed (those of the internal
     engine). The assumed properties of swapped disks follow them, unless assumed ones
     are given: these stay in their order."""
+    property_error: float = 0.0
+    """Error of the masses and radii given to the model (fraction): each is too large or
+    too small by it, drawn at random for each trial."""
+    adapt: bool = False
+    """Estimate the properties that affect pushes (radii, ratios of masses, frictions of
+    contact, pressure) from the pushes of each episode. The given ones are the start."""
     tolerance: float = 0.1
     """Success tolerance (fraction of target-disk radius)."""
     stopping_tolerance: float = 0.9
@@ -66,6 +73,9 @@ class ControlConfig(RobotConfig):
         require_one_of(
             "given_properties", self.given_properties, get_args(GivenProperties)
         )
+        wrong = self.property_error
+        wanted = f"from 0 to {_MOST_WRONG:g}"
+        require(0 <= wrong <= _MOST_WRONG, "property_error", wanted, wrong)
         wanted = f"at least {_LEAST_TOLERANCE:g}, below 1"
         good = _LEAST_TOLERANCE <= self.tolerance < 1
         require(good, "tolerance", wanted, self.tolerance)

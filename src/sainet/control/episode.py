@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Float
 
+from sainet.identification.adaptation import Adaptation
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.base import AbstractPlanner, Plan
 from sainet.robots.base import AbstractRobot
@@ -36,6 +37,7 @@ class ControlStep:
     plan: Plan
     recording: Recording
     seconds: float  # of the decision
+    scene: Scene  # properties that it was made with
 
 
 @dataclass
@@ -56,6 +58,7 @@ def run_episode(
     *,
     pushes: int = 60,
     episode: Episode | None = None,
+    adaptation: Adaptation | None = None,
     on_step: Callable[[ControlStep], None] = lambda step: None,
 ) -> Episode:
     """Return an episode, which ends when the task is solved or no push is left.
@@ -68,6 +71,8 @@ def run_episode(
         scene: properties given to model and task.
         pushes: maximum number of pushes.
         episode: filled during the episode, so that an interruption keeps its steps.
+        adaptation: estimates properties from the pushes; replaces `dynamics`, and the
+            scene that plans are made with. None: the given properties stay.
         on_step: called after each push.
 
     Returns:
@@ -86,13 +91,16 @@ def run_episode(
         if len(episode.steps) == pushes:
             return _end(episode, _out_of_pushes(task, planner, episode, pushes))
         start = time.perf_counter()
+        model = (dynamics, scene) if adaptation is None else adaptation.adapted(state)
         try:
-            plan = planner.plan(dynamics, task, scene, state)
+            plan = planner.plan(model[0], task, model[1], state)
         except (BadScene, Diverged) as error:
             return _end(episode, f"planning failed: {error}")
         seconds = time.perf_counter() - start
         recording = checked(robot.push(plan.pushes[0]), plan.pushes[0])
-        episode.steps.append(ControlStep(state, plan, recording, seconds))
+        if adaptation is not None:
+            adaptation.add(recording)
+        episode.steps.append(ControlStep(state, plan, recording, seconds, model[1]))
         on_step(episode.steps[-1])
         troubles = troubles + 1 if recording.trouble else 0
         if troubles == MOST_TROUBLES:

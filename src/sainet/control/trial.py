@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -15,7 +16,7 @@ from sainet.scenes.scene import Scene
 from sainet.tasks.push_to_goal import PushToGoal, draw_goal
 from sainet.worlds.sampling import scattered
 
-_STARTS = 0x57A2
+_STARTS, _WRONG = 0x57A2, 0x3A09
 _FRICTION = PAPER.table_friction or 0.0
 
 
@@ -58,7 +59,18 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
     if config.given_properties == "assumed":
         assert PAPER.mass and PAPER.radius  # both are assumed
         given = scene_of(PAPER.mass, PAPER.radius, config.disks, _FRICTION)
-    return Trial(robot, task, given)
+    return Trial(robot, task, wrong_by(given, config, index))
+
+
+def wrong_by(scene: Scene, config: ControlConfig, index: int) -> Scene:
+    """Return a scene with masses and radii that are wrong by the error of a trial."""
+    if not config.property_error:
+        return scene
+    rng = np.random.default_rng([_WRONG, config.seed, index])
+    signs = rng.choice([-1.0, 1.0], (2, scene.body_count)).astype(np.float32)
+    factors = 1 + np.float32(config.property_error) * signs
+    wrong = scene.mass * factors[0], scene.radius * factors[1]
+    return eqx.tree_at(lambda s: (s.mass, s.radius), scene, wrong)
 
 
 def assumed_frictions(scene: Scene) -> Scene:

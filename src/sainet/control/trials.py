@@ -22,6 +22,7 @@ from sainet.control.record import (
 from sainet.control.trial import make_trial
 from sainet.engines import make_engine
 from sainet.evaluation.measurements import Condition, Header, Measurements
+from sainet.identification.adaptation import Adaptation, check_adapts
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
@@ -87,6 +88,7 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
                 trial.scene,
                 pushes=config.pushes,
                 episode=episode,
+                adaptation=Adaptation(model, trial.scene) if config.adapt else None,
             )
         except KeyboardInterrupt:
             left = path.with_suffix(".interrupted.json")
@@ -118,6 +120,8 @@ def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     follows = config.swapped and config.given_properties == "true"
     model = load_model(config.model, order=(1, 0) if follows else None)
     model.check_fits("robot", TIME_STEP)
+    if config.adapt:
+        check_adapts(model)
     planner = make_planner(config.planner, deadline=config.deadline)
     make_engine(config.world)
     return model, planner

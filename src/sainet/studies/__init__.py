@@ -20,6 +20,7 @@ STUDIES = {
     "regularisation": "sainet.studies.variants:REGULARISATION",
     "robustness": "sainet.studies.robustness:STUDY",
     "simulated-control": "sainet.studies.simulated_control:STUDY",
+    "adaptation": "sainet.studies.adaptation:STUDY",
     "engine-parity": "sainet.studies.engine_parity:STUDY",
     "robot-planar": "sainet.studies.paper_tables:ROBOT_PLANAR",
     "pretrained": "sainet.studies.pretrained:STUDY",

@@ -46,6 +46,11 @@ class FitEngine(Apart[Model]):
 
     pushes: Given
 
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return "identify"
+
     def work(self, folder: Path) -> None:
         """Identify the parameters."""
         identify_into(self.pushes.store, folder)
@@ -174,6 +179,11 @@ class EvaluateFitted(Apart[Measurements]):
     fitted: tuple[FitCandidate, ...]
     pushes: Given
     condition: Condition
+
+    @property
+    def name(self) -> str:
+        """What is done."""
+        return "evaluate"
 
     def work(self, folder: Path) -> None:
         """Predict the pushes, and write the measurements."""

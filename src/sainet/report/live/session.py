@@ -174,7 +174,7 @@ class Session:
         trial, moment, push = self.trial, self.moment, plan.pushes[0]
         paths = self.predictor.paths(moment, push)
         recording = checked(trial.robot.push(push), push)
-        step = ControlStep(moment.observed, plan, recording, 0.0)
+        step = ControlStep(moment.observed, plan, recording, 0.0, trial.scene)
         self._episode.steps.append(step)
         outcome = poses_of(trial.robot.truth)
         if not np.isfinite(outcome).all():
