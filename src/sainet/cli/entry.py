@@ -21,6 +21,7 @@ from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
 from sainet.cli.output import finish
 from sainet.cli.play import Play
+from sainet.cli.propose import Propose
 from sainet.cli.record import Record
 from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
@@ -42,6 +43,7 @@ _COMMANDS = {
     "evaluate": Evaluate,
     "identify": Identify,
     "cross-validate": CrossValidate,
+    "propose": Propose,
     "control": Control,
     "reproduce": Reproduce,
     "report": MakeReport,

@@ -30,10 +30,10 @@ class Reproduce:
     regularisation and robustness, with the networks of Table III; simulated-control and
     adaptation, with shipped networks; robot-planar; engine-parity; pretrained (the
     shipped networks); fine-tuning (settings chosen on simulated pushes);
-    recorded-pushes, recorded-trust, recorded-data-efficiency and lab-realism, which
-    need --recorded; lab-collect, lab-prediction (Table IV), lab-control,
-    lab-new-surface and lab-swapped-disks, in virtual labs. Default: every study whose
-    requirements are met."""
+    recorded-pushes, recorded-trust, recorded-few, recorded-active,
+    recorded-data-efficiency and lab-realism, which need --recorded; lab-collect,
+    lab-prediction (Table IV), lab-control, lab-new-surface and lab-swapped-disks, in
+    virtual labs. Default: every study whose requirements are met."""
     scale: Scale = "quick"
     """Size of datasets and training runs: quick for minutes per study, paper for 4,500
     pushes and 10,000 iterations per network."""

@@ -93,7 +93,7 @@ def fit_process(
     if callable(internal):
         internal = internal(out / ENGINE)
     ends = ends_of(store, internal, settings.features)
-    fitted, loss = _fit(ends, settings, on_output)
+    fitted, loss = fit_to(ends, settings, on_output)
     arrays = _calibrate(ends, fitted, settings, store.info.time_step, on_output)
     with jax.enable_x64(True):
         data = save_arrays(out / ARRAYS, arrays)
@@ -150,10 +150,10 @@ def check_store(store: Store, settings: ProcessSettings) -> None:
         )
 
 
-def _fit(
+def fit_to(
     ends: Ends,
     settings: ProcessSettings,
-    on_output: Callable[[], None],
+    on_output: Callable[[], None] = lambda: None,
     begin: np.ndarray | None = None,
 ) -> tuple[Fitted, float]:
     """Return the most probable process, and its mean loss for push and output.
@@ -250,7 +250,7 @@ def _calibrate(
     scores, plain = [], []
     for fold in range(settings.folds):
         others, held = ends.take(owner != fold), ends.take(owner == fold)
-        part, _ = _fit(others, settings, on_output, begin)
+        part, _ = fit_to(others, settings, on_output, begin)
         process = corrector_of(part, ends.names, time_step)
         mean, deviation = process.rates(jnp.asarray(held.inputs, jnp.float32))
         off = held.rates - np.asarray(mean)

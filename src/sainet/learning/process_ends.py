@@ -8,13 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from sainet.datasets.batch import Prediction, PushBatch
+from sainet.datasets.batch import Prediction, PushBatch, to_batch
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
 from sainet.models.correctors.process import RESIDUALS, known_inputs, travel_of
 from sainet.models.identity import ProcessFeatures
 from sainet.models.inputs import push_frame
 from sainet.runs.errors import BadInput, BadStore
+from sainet.scenes.recording import AGREES, CameraOffset
 
 # Inputs of each kind of features; every kind has those before it.
 ADDED: Mapping[ProcessFeatures, tuple[str, ...]] = {
@@ -43,6 +44,26 @@ class Ends:
         return replace(
             self, inputs=inputs, rates=rates, travel=travel, kinds=self.kinds[rows]
         )
+
+
+def inputs_of(
+    store: Store, names: tuple[str, ...], disks: int, camera: CameraOffset = AGREES
+) -> Float[np.ndarray, "push input"]:
+    """Return some inputs of all pushes, whether their ends were observed or not.
+
+    Raises:
+        BadStore: the pushes are of another number of disks, or driven by forces.
+    """
+    if store.info.bodies != disks or store.info.kind != "robot":
+        raise BadStore(
+            f"{store.path}: {store.info.kind} pushes of {store.info.bodies} disk(s), "
+            f"the process is of robot pushes of {disks}; give such pushes."
+        )
+    batch, offset = to_batch(store.read(slice(None)), store.info), camera.vector
+    initial = batch.initial.with_pusher_moved(jnp.array(offset))
+    controls = batch.controls.moved(jnp.array(offset))
+    found = _inputs(replace(batch, initial=initial, controls=controls))
+    return np.stack([np.asarray(found[name], np.float64) for name in names], axis=1)
 
 
 def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -> Ends:
@@ -87,9 +108,14 @@ def _ends(batch: PushBatch) -> tuple[dict[str, Array], Array, Array]:
     turned = jnp.mod(turned + jnp.pi, 2 * jnp.pi) - jnp.pi
     along, across = cosine * x + sine * y, cosine * y - sine * x
     residual = jnp.stack([along, across, turned], axis=-1).reshape(len(last), -1)
+    return _inputs(batch), residual / driven[:, None], driven
+
+
+def _inputs(batch: PushBatch) -> dict[str, Array]:
+    """Return everything that can be an input."""
+    heading = travel_of(batch.controls, batch.initial)[1]
     pushed = push_frame(batch.scene, batch.initial).pushed
-    inputs = known_inputs(batch.scene, batch.initial, pushed, heading)
-    return inputs, residual / driven[:, None], driven
+    return known_inputs(batch.scene, batch.initial, pushed, heading)
 
 
 def _varying(

@@ -139,13 +139,22 @@ def corrector_of(
 
 def covariance_of(fitted: Fitted, output: int) -> Float[np.ndarray, "push push"]:
     """Return the covariance of an output at its pushes, noise included."""
+    found = covariance_between(fitted, output, fitted.inputs, fitted.inputs)
+    return found + fitted.noise[output] * np.eye(len(found))
+
+
+def covariance_between(
+    fitted: Fitted,
+    output: int,
+    one: Float[np.ndarray, "one input"],
+    other: Float[np.ndarray, "other input"],
+) -> Float[np.ndarray, "one other"]:
+    """Return the prior covariance of an output at standardised inputs, no noise."""
     with jax.enable_x64(True):
         kernel = kernel_of(
             jnp.asarray(fitted.amplitude[output]), jnp.asarray(fitted.length[output])
         )
-        points = jnp.asarray(fitted.inputs)
-        covariance = np.asarray(kernel(points, points))
-    return covariance + fitted.noise[output] * np.eye(len(points))
+        return np.array(kernel(jnp.asarray(one), jnp.asarray(other)))
 
 
 def is_process(folder: Path) -> bool:
@@ -169,6 +178,16 @@ def read_process_card(folder: Path) -> ProcessCard:
 
 def load_process(folder: Path) -> tuple[ResidualProcess, ProcessCard]:
     """Read a Gaussian process and its card.
+
+    Raises:
+        BadCheckpoint: damaged, of another format, or the two do not fit.
+    """
+    fitted, card = read_process(folder)
+    return corrector_of(fitted, card.inputs, card.time_step), card
+
+
+def read_process(folder: Path) -> tuple[Fitted, ProcessCard]:
+    """Read the arrays of a Gaussian process and its card.
 
     Raises:
         BadCheckpoint: damaged, of another format, or the two do not fit.
@@ -198,7 +217,7 @@ def load_process(folder: Path) -> tuple[ResidualProcess, ProcessCard]:
             f"{folder / PROCESS}: weights is another hash than that of {ARRAYS}; the "
             "two do not belong together, fit the process again."
         )
-    return corrector_of(fitted, card.inputs, card.time_step), card
+    return fitted, card
 
 
 def _is_possible(fitted: Fitted) -> bool:

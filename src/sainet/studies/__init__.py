@@ -27,6 +27,8 @@ STUDIES = {
     "fine-tuning": "sainet.studies.fine_tuning:STUDY",
     "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
     "recorded-trust": "sainet.studies.recorded_trust:STUDY",
+    "recorded-few": "sainet.studies.recorded_few:STUDY",
+    "recorded-active": "sainet.studies.recorded_active:STUDY",
     "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",
     "lab-realism": "sainet.studies.lab_realism:STUDY",
     "lab-collect": "sainet.studies.lab_pushes:STUDY",

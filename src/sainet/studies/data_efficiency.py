@@ -81,7 +81,7 @@ def _recorded(scope: Scope) -> Plan:
         folds, parts = [], []
         for rows in surfaces_of(store).values():
             for fold in make_folds(store, FOLDS[scope.scale], rows):
-                tuned = TunedModels(_first(fold, pushes), scope.scale)
+                tuned = TunedModels(first_pushes(fold, pushes), scope.scale)
                 models = (*tuned.physics(), *map(tuned.model, VARIANTS))
                 folds.append(fold)
                 parts.append(Evaluate(tuple(models), Given(fold.tests)))
@@ -89,7 +89,7 @@ def _recorded(scope: Scope) -> Plan:
     return Plan(Join(tuple(sizes)))
 
 
-def _first(fold: Fold, pushes: int) -> Store:
+def first_pushes(fold: Fold, pushes: int) -> Store:
     """Return so many training pushes of a fold, repeats beside each other."""
     repeats = fold.training.repeats()
     kinds = fold_of_push(repeats, len(np.unique(repeats)), seed=fold.number)
