@@ -12,6 +12,8 @@ from sainet.cli.help import field_texts
 COMMANDS = [
     "demo",
     "generate",
+    "import",
+    "split",
     "add-bystander",
     "train",
     "tune",

@@ -70,11 +70,19 @@ class Import:
     out: Path
     """Run folder; identical settings resume."""
     properties: Path | None = None
-    """TOML file of masses, radii and frictions (only for the format table)."""
+    """TOML file of masses (kg), radii (m) and frictions, for the format table only.
+    Default: none."""
     contact_friction: float | None = None
-    """Friction between pusher and disk, and between disks.
-    None: value of the properties of a table, else 0.25,
-    from a sweep on pushes of the MIT Push dataset."""
+    """Friction between pusher and disk, and between disks. Default: that of the
+    properties of a table, else 0.25, from a sweep on pushes of the MIT Push dataset."""
+    length_unit: Literal["m", "mm"] = "m"
+    """Unit of x, y, pusher_x and pusher_y in a table. The properties are in m."""
+    angle_unit: Literal["rad", "deg"] = "rad"
+    """Unit of the angles in a table."""
+    time_unit: Literal["s", "ms"] = "s"
+    """Unit of the times in a table."""
+    skip_bad: bool = False
+    """Leave out pushes of a table with a problem; print how many and why."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -83,20 +91,41 @@ class Import:
         store = self._import()
         self.output.say(f"{store.info.pushes} pushes are in {self.out}")
         groups = list(store.info.groups)
-        return {"out": str(self.out), "pushes": store.info.pushes, "groups": groups}
+        result = {"out": str(self.out), "pushes": store.info.pushes, "groups": groups}
+        if self.skip_bad:
+            from sainet.runs.documents import read_json
+            from sainet.runs.folders import CONFIG
+
+            result["left_out"] = read_json(self.out / CONFIG).get("left_out", 0)
+        return result
 
     def _import(self) -> "Store":
         friction = self.contact_friction
         if self.format == "table":
             from sainet.datasets.recorded.own import import_table
+            from sainet.datasets.recorded.units import Units
 
             if self.properties is None:
                 raise BadInput("`properties` is missing; give a TOML file of bodies.")
             return import_table(
-                self.path, self.properties, self.out, contact_friction=friction
+                self.path,
+                self.properties,
+                self.out,
+                contact_friction=friction,
+                skip_bad=self.skip_bad,
+                units=Units(
+                    length=self.length_unit, angle=self.angle_unit, time=self.time_unit
+                ),
             )
-        if self.properties is not None:
-            raise BadInput("`properties` is for the format table; leave it out.")
+        for name in (
+            "properties",
+            "length_unit",
+            "angle_unit",
+            "time_unit",
+            "skip_bad",
+        ):
+            if getattr(self, name) != getattr(Import, name):
+                raise BadInput(f"`{name}` is for the format table; leave it out.")
         given = {} if friction is None else {"contact_friction": friction}
         if self.format == "mitpush":
             from sainet.datasets.recorded.raw import import_mitpush
@@ -111,16 +140,16 @@ class Import:
 class Split:
     """Divide recorded pushes into training pushes and test pushes.
 
-    Repeats stay together. Train on OUT/train, evaluate on OUT/test. For simulated
-    pushes generate a test dataset with another seed instead.
+    Repeats stay together. Train on OUT/train, evaluate on OUT/test.
     """
 
     data: Path
-    """Dataset to divide."""
+    """Dataset to divide. For simulated pushes generate a test dataset with another
+    seed instead."""
     out: Path
     """Folder for the datasets train and test; identical settings resume."""
     test: float = 0.2
-    """Share of the test pushes."""
+    """Share of the test pushes, above 0 and below 1."""
     seed: int = 0
     """Random seed of the draw."""
     chains: bool = False
