@@ -56,7 +56,7 @@ IMPORTS = {
         PROPERTIES.replace("1.0", "1.2").replace("0.3", "0.2"),
         Units(),
     ),
-    "another unit": (in_millimetres, PROPERTIES, Units(length="mm")),
+    "another unit": (in_millimetres, PROPERTIES, Units(length_unit="mm")),
 }
 
 

@@ -9,6 +9,7 @@ from tyro.conf import Positional, arg
 from sainet.cli.devices import use_cache, use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.datasets.config import GenerateConfig
+from sainet.datasets.recorded.units import Units
 from sainet.runs.errors import BadInput, require
 from sainet.runs.workers import worker_pool
 from sainet.worlds.config import SetupName
@@ -75,12 +76,7 @@ class Import:
     contact_friction: float | None = None
     """Friction between pusher and disk, and between disks. Default: that of the
     properties of a table, else 0.25, from a sweep on pushes of the MIT Push dataset."""
-    length_unit: Literal["m", "mm"] = "m"
-    """Unit of x, y, pusher_x and pusher_y in a table. The properties are in m."""
-    angle_unit: Literal["rad", "deg"] = "rad"
-    """Unit of the angles in a table."""
-    time_unit: Literal["s", "ms"] = "s"
-    """Unit of the times in a table."""
+    units: Units = field(default_factory=Units)
     skip_bad: bool = False
     """Leave out pushes of a table with a problem; print how many and why."""
     output: Output = field(default_factory=Output)
@@ -103,7 +99,6 @@ class Import:
         friction = self.contact_friction
         if self.format == "table":
             from sainet.datasets.recorded.own import import_table
-            from sainet.datasets.recorded.units import Units
 
             if self.properties is None:
                 raise BadInput("`properties` is missing; give a TOML file of bodies.")
@@ -113,19 +108,11 @@ class Import:
                 self.out,
                 contact_friction=friction,
                 skip_bad=self.skip_bad,
-                units=Units(
-                    length=self.length_unit, angle=self.angle_unit, time=self.time_unit
-                ),
+                units=self.units,
             )
-        for name in (
-            "properties",
-            "length_unit",
-            "angle_unit",
-            "time_unit",
-            "skip_bad",
-        ):
-            if getattr(self, name) != getattr(Import, name):
-                raise BadInput(f"`{name}` is for the format table; leave it out.")
+        given = {"properties": self.properties, "skip_bad": self.skip_bad}
+        for name in [n for n, value in given.items() if value] + [*self.units.settings]:
+            raise BadInput(f"`{name}` is for the format table; leave it out.")
         given = {} if friction is None else {"contact_friction": friction}
         if self.format == "mitpush":
             from sainet.datasets.recorded.raw import import_mitpush

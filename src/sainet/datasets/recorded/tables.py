@@ -216,8 +216,8 @@ class _Reader:
             if not text and not is_cut:
                 is_of_push = name != self.columns.texts[0]
                 self.is_whole &= is_of_push
-                line = f"{where}: {name} is empty; write its name."
-                self.problems.add(f"empty {name}", line, of_push=is_of_push)
+                problem = f"{where}: {name} is empty; write its name."
+                self.problems.add(f"empty {name}", problem, of_push=is_of_push)
             codes.append(names.setdefault(text, len(names)))
         for name, values in self.numbers.items():
             field = f"{where}: {name}"
@@ -225,9 +225,8 @@ class _Reader:
 
     def _names_push(self, fields: list[str]) -> bool:
         """Return whether the first text, the push, is whole in a row that is cut."""
-        first = self.columns.texts[:1]
-        place = self.header.index(*first) if first and first[0] in self.header else -1
-        return 0 <= place < len(fields) - 1 and bool(fields[place].strip())
+        named = dict(zip(self.header, fields[:-1], strict=False))
+        return any(named.get(name, "").strip() for name in self.columns.texts[:1])
 
     def table(self) -> Table:
         return Table(
