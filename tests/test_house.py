@@ -220,6 +220,18 @@ TRUST = (
 
 MJCF = ("api/mjcf",)
 
+ENGINEER = (
+    "cli/inspect",
+    "datasets/doubts",
+    "datasets/facts",
+    "datasets/inspection",
+    # With lines that stood in datasets/recorded/tables.py before.
+    "datasets/recorded/problems",
+    "datasets/recorded/units",
+    "report/figures/recordings",
+    "report/pages/inspection",
+)
+
 
 def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
     """Modules whose paths begin with one of these."""
@@ -227,10 +239,11 @@ def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
 
 
 ADDED = modules_of(ROBOTS)
-LATER = ADDED + modules_of(WAY_IN) + modules_of(TRUST)
+LATER = ADDED + modules_of(WAY_IN) + modules_of(TRUST) + modules_of(ENGINEER)
 REBUILT = [path for path in MODULES if path not in LATER]
-# Lines in older modules that connect Gaussian processes, regions and coverage to them.
-CONNECTIONS = 85
+# Lines in older modules that connect Gaussian processes, regions and coverage to them,
+# and the engineer's path: units and bad pushes of tables.
+CONNECTIONS = 85 + 25
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
@@ -259,6 +272,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(TRUST))),
         1_050,
         1_050,
+    ),
+    "code lines of the engineer's path": (
+        lambda: sum(map(code_lines, modules_of(ENGINEER))),
+        600,
+        600,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

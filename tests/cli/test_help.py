@@ -13,6 +13,7 @@ COMMANDS = [
     "demo",
     "generate",
     "import",
+    "inspect",
     "split",
     "add-bystander",
     "train",
