@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datasets.own_pushes import HEADER, rows, to_csv, to_parquet, write
+from datasets.own_pushes import HEADER, PROPERTIES, rows, to_csv, to_parquet, write
 from datasets.stores import contents
 from sainet.cli.entry import run
 from sainet.datasets.recorded.own import import_table
@@ -225,3 +225,15 @@ def test_options_of_tables_are_refused_for_other_formats(tmp_path: Path, capfd, 
     assert error.startswith(
         f"sainet: {option.partition('=')[0]} is for the format table"
     )
+
+
+def test_problems_of_the_properties_are_never_skipped(tmp_path: Path):
+    properties = PROPERTIES.replace("mass = 1.0", "mass = -1")
+    with pytest.raises(BadTable, match=r"mass is -1; it must be") as caught:
+        import_table(
+            *write(tmp_path, to_csv(mixed()), properties),
+            tmp_path / "out",
+            skip_bad=True,
+        )
+    assert len(caught.value.problems) == len(BAD) + 1
+    assert not (tmp_path / "out").exists()

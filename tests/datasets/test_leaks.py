@@ -49,7 +49,12 @@ def in_millimetres(lines: list[list]) -> list[list]:
     ]
 
 
+def a_turn_away(lines: list[list]) -> list[list]:
+    return [[*r[:5], r[5] - 2 * np.pi, *r[6:]] for r in lines]
+
+
 IMPORTS = {
+    "another turn of the angles": (a_turn_away, PROPERTIES, Units()),
     "another order and other names": (shuffled, PROPERTIES, Units()),
     "other masses and frictions": (
         list,

@@ -253,6 +253,8 @@ class _Push:
             axis=1,
         )
         pose[..., 2] = np.unwrap(pose[..., 2], axis=0)
+        # A push has the same hash whatever the turn that its angles are counted in.
+        pose[..., 2] -= 2 * np.pi * np.rint(pose[0, :, 2] / (2 * np.pi))
         return Recording(
             time=self.column("time", 0),
             pose=pose,
