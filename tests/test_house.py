@@ -236,6 +236,18 @@ CHOOSING = (
 )
 ADAPTATION = ("identification/adaptation", "studies/adaptation")
 
+ENGINEER = (
+    "cli/inspect",
+    "datasets/doubts",
+    "datasets/facts",
+    "datasets/inspection",
+    # With lines that stood in datasets/recorded/tables.py before.
+    "datasets/recorded/problems",
+    "datasets/recorded/units",
+    "report/figures/recordings",
+    "report/pages/inspection",
+)
+
 
 def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
     """Modules whose paths begin with one of these."""
@@ -243,12 +255,15 @@ def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
 
 
 ADDED = modules_of(ROBOTS)
-LATER = ADDED + modules_of(WAY_IN + TRUST + VALIDATION + ADAPTATION + CHOOSING)
+LATER = ADDED + modules_of(
+    WAY_IN + TRUST + VALIDATION + ADAPTATION + CHOOSING + ENGINEER
+)
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
 CONNECTIONS = {
     "Gaussian processes, regions and coverage": 85,
     "adaptation": 25,
+    "units and bad pushes of tables": 35,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -298,6 +313,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(ADAPTATION))),
         250,
         250,
+    ),
+    "code lines of the engineer's path": (
+        lambda: sum(map(code_lines, modules_of(ENGINEER))),
+        600,
+        600,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

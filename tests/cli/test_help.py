@@ -12,6 +12,9 @@ from sainet.cli.help import field_texts
 COMMANDS = [
     "demo",
     "generate",
+    "import",
+    "inspect",
+    "split",
     "add-bystander",
     "train",
     "tune",

@@ -14,8 +14,8 @@ from sainet.datasets.recorded.endpoints import (
     find_log,
     read_endpoints,
 )
+from sainet.datasets.recorded.problems import Problems
 from sainet.datasets.recorded.properties import mitpush_properties
-from sainet.datasets.recorded.tables import Problems
 from sainet.runs.errors import BadTable
 
 ROW = {

@@ -328,15 +328,6 @@ def test_a_misnamed_column_is_reported_with_the_units_of_the_others(tmp_path: Pa
     assert "y is 100 (in millimetres?)" in millimetres
 
 
-def test_more_than_eight_kinds_are_counted(tmp_path: Path):
-    text, properties = typical_mistakes()
-    properties = properties.replace("table = 0.3", "table = -1\nslope = 1")
-    with pytest.raises(BadTable) as caught:
-        import_table(*write(tmp_path, text, properties), tmp_path / "out")
-    assert len(caught.value.problems) == 8
-    assert caught.value.problems[-1] == "and 3 other kinds of problems."
-
-
 def test_a_disk_far_from_the_pusher_is_refused(tmp_path: Path):
     table = rows()
     for row in table:

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.api.pushes import Dataset, store_of
+from sainet.datasets.recorded.problems import Problems
 from sainet.datasets.recorded.tables import (
     LARGEST,
     Columns,
-    Problems,
     Table,
     read_bytes,
     read_csv,

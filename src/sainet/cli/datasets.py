@@ -9,6 +9,7 @@ from tyro.conf import Positional, arg
 from sainet.cli.devices import use_cache, use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.datasets.config import GenerateConfig
+from sainet.datasets.recorded.units import Units
 from sainet.runs.errors import BadInput, require
 from sainet.runs.workers import worker_pool
 from sainet.worlds.config import SetupName
@@ -70,11 +71,14 @@ class Import:
     out: Path
     """Run folder; identical settings resume."""
     properties: Path | None = None
-    """TOML file of masses, radii and frictions (only for the format table)."""
+    """TOML file of masses (kg), radii (m) and frictions, for the format table only.
+    Default: none."""
     contact_friction: float | None = None
-    """Friction between pusher and disk, and between disks.
-    None: value of the properties of a table, else 0.25,
-    from a sweep on pushes of the MIT Push dataset."""
+    """Friction between pusher and disk, and between disks. Default: that of the
+    properties of a table, else 0.25, from a sweep on pushes of the MIT Push dataset."""
+    units: Units = field(default_factory=Units)
+    skip_bad: bool = False
+    """Leave out pushes of a table with a problem; print how many and why."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -83,7 +87,13 @@ class Import:
         store = self._import()
         self.output.say(f"{store.info.pushes} pushes are in {self.out}")
         groups = list(store.info.groups)
-        return {"out": str(self.out), "pushes": store.info.pushes, "groups": groups}
+        result = {"out": str(self.out), "pushes": store.info.pushes, "groups": groups}
+        if self.skip_bad:
+            from sainet.runs.documents import read_json
+            from sainet.runs.folders import CONFIG
+
+            result["left_out"] = read_json(self.out / CONFIG).get("left_out", 0)
+        return result
 
     def _import(self) -> "Store":
         friction = self.contact_friction
@@ -93,10 +103,16 @@ class Import:
             if self.properties is None:
                 raise BadInput("`properties` is missing; give a TOML file of bodies.")
             return import_table(
-                self.path, self.properties, self.out, contact_friction=friction
+                self.path,
+                self.properties,
+                self.out,
+                contact_friction=friction,
+                skip_bad=self.skip_bad,
+                units=self.units,
             )
-        if self.properties is not None:
-            raise BadInput("`properties` is for the format table; leave it out.")
+        given = {"properties": self.properties, "skip_bad": self.skip_bad}
+        for name in [n for n, value in given.items() if value] + [*self.units.settings]:
+            raise BadInput(f"`{name}` is for the format table; leave it out.")
         given = {} if friction is None else {"contact_friction": friction}
         if self.format == "mitpush":
             from sainet.datasets.recorded.raw import import_mitpush
@@ -111,16 +127,16 @@ class Import:
 class Split:
     """Divide recorded pushes into training pushes and test pushes.
 
-    Repeats stay together. Train on OUT/train, evaluate on OUT/test. For simulated
-    pushes generate a test dataset with another seed instead.
+    Repeats stay together. Train on OUT/train, evaluate on OUT/test.
     """
 
     data: Path
-    """Dataset to divide."""
+    """Dataset to divide. For simulated pushes generate a test dataset with another
+    seed instead."""
     out: Path
     """Folder for the datasets train and test; identical settings resume."""
     test: float = 0.2
-    """Share of the test pushes."""
+    """Share of the test pushes, above 0 and below 1."""
     seed: int = 0
     """Random seed of the draw."""
     chains: bool = False

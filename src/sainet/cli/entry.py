@@ -19,6 +19,7 @@ from sainet.cli.demo import Demo
 from sainet.cli.evaluate import Evaluate
 from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
+from sainet.cli.inspect import Inspect
 from sainet.cli.output import finish
 from sainet.cli.play import Play
 from sainet.cli.propose import Propose
@@ -36,6 +37,7 @@ _COMMANDS = {
     "generate": Generate,
     "record": Record,
     "import": Import,
+    "inspect": Inspect,
     "split": Split,
     "add-bystander": AddBystander,
     "train": Train,

@@ -30,7 +30,7 @@ class BadTable(BadInput):
     """Files of recorded pushes that cannot be used; each problem is one line."""
 
     def __init__(self, *problems: str) -> None:
-        """Keep the problems, the first of each kind; each line names its file."""
+        """Keep the problems; each line names its file."""
         super().__init__("\n".join(problems))
         self.problems = problems
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from sainet.datasets.recorded.problems import Problems
 from sainet.datasets.recorded.tables import (
     MOST_ROWS,
     SHOWN,
     Columns,
-    Problems,
     Table,
     Texts,
 )
@@ -112,13 +112,10 @@ class _Converter:
             return np.zeros(0)
         values = column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
         wrong = np.flatnonzero(~np.isfinite(values))
-        if len(wrong):
-            row, value = wrong[0] + 1, values[wrong[0]]
-            self._bad(
-                name,
-                f"row {row}: {name} is {value}; it must be a finite number: repair or "
-                "remove the row.",
-            )
+        for row in wrong:
+            text = f"row {row + 1}: {name} is {values[row]}; it must be a finite number"
+            line = f"{self._path}: {text}: repair or remove the row."
+            self._problems.add(f"column {name}", line, of_push=True)
         return np.where(np.isfinite(values), values, np.nan).astype(float)
 
     def texts(self, name: str, column: Any) -> Texts | None:  # noqa: ANN401

@@ -11,6 +11,7 @@ from sainet.datasets.recorded import tables
 from sainet.datasets.recorded.binary import read_mat
 from sainet.datasets.recorded.checks import ANGLE, PLACE, recording_problems
 from sainet.datasets.recorded.importing import import_pushes
+from sainet.datasets.recorded.problems import Problems
 from sainet.datasets.recorded.properties import (
     CONTACT_FRICTION,
     MITPUSH_DISK,
@@ -134,7 +135,7 @@ def read_endpoints(path: Path, data: bytes, properties: Properties) -> Endpoints
         BadTable: with file, row (line of the file, from 1; record, from 0) and remedy;
             the first problem of each kind, one a line.
     """
-    problems = tables.Problems()
+    problems = Problems()
     if path.suffix.lower() == ".mat":
         table, model = read_mat(path, data, problems)
     else:
@@ -159,7 +160,7 @@ def read_endpoints(path: Path, data: bytes, properties: Properties) -> Endpoints
     return Endpoints(recordings, published, f"zhou-{model}")
 
 
-def _check_shapes(table: tables.Table, problems: tables.Problems) -> None:
+def _check_shapes(table: tables.Table, problems: Problems) -> None:
     shape = table.texts.get("shape")
     for code, name in enumerate(shape.names if shape else []):
         if shape and name and name != MITPUSH_DISK:

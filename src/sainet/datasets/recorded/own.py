@@ -10,8 +10,10 @@ from jaxtyping import Float, Int
 
 from sainet.datasets.recorded import checks, tables
 from sainet.datasets.recorded.importing import import_pushes
+from sainet.datasets.recorded.problems import Problems
 from sainet.datasets.recorded.properties import Properties, read_properties
 from sainet.datasets.recorded.resample import resample
+from sainet.datasets.recorded.units import Units
 from sainet.datasets.store import Store
 from sainet.runs.documents import content_hash
 from sainet.scenes.recording import Conditions, Recording
@@ -29,7 +31,13 @@ COLUMNS = tables.Columns(
 
 
 def import_table(
-    path: Path, properties: Path, out: Path, *, contact_friction: float | None = None
+    path: Path,
+    properties: Path,
+    out: Path,
+    *,
+    contact_friction: float | None = None,
+    units: Units | None = None,
+    skip_bad: bool = False,
 ) -> Store:
     """Make a store of a table with one row for each push, time and body.
 
@@ -39,36 +47,41 @@ def import_table(
         out: run folder.
         contact_friction: of two bodies, and of pusher and body; replaces the value of
             the properties.
+        units: of the table; None: m, rad and s. Messages are in m, rad and s.
+        skip_bad: leave out pushes with a problem, and log how many and why.
 
     Raises:
-        BadTable: with file, row (line of the file, from 1) and remedy; the first
-            problem of each kind, one a line.
+        BadTable: with file, row (line of the file, from 1), field and remedy; one
+            problem a line, at most 20.
         BadSetting: the friction is out of range.
         MissingExtra: the table is Parquet, and pyarrow is not installed.
         RunConflict: the folder holds something else.
         BadInput: the disk is full.
     """
-    path, problems = Path(path), tables.Problems()
+    path, problems = Path(path), Problems()
     data = tables.read_bytes(path, ".csv", ".parquet")
-    table = _read(path, data, problems)
+    units = units or Units()
+    table = units.to_si(_read(path, data, problems))
     known = read_properties(Path(properties), contact_friction, problems)
     bodies = _present(table, known, Path(properties), problems)
     recordings = list(_recordings(table, bodies, problems)) if bodies else []
-    problems.raise_any()
+    problems.raise_any(skip_bad=skip_bad and len(recordings) > 0)
     assert bodies is not None
+    settings = {"command": "import table", "source": path.name}
+    settings |= {"source_sha256": content_hash(data)} | units.settings
+    if skip_bad:
+        count = len(table.texts["push"].names)
+        settings |= {"skip_bad": True, "left_out": count - len(recordings)}
+        problems.warn(path, count - len(recordings), count)
     return import_pushes(
         out,
-        {
-            "command": "import table",
-            "source": path.name,
-            "source_sha256": content_hash(data),
-        },
+        settings,
         [resample(recording) for recording in recordings],
         bodies,
     )
 
 
-def _read(path: Path, data: bytes, problems: tables.Problems) -> tables.Table:
+def _read(path: Path, data: bytes, problems: Problems) -> tables.Table:
     if path.suffix.lower() == ".parquet":
         from sainet.datasets.recorded.binary import read_parquet
 
@@ -77,7 +90,7 @@ def _read(path: Path, data: bytes, problems: tables.Problems) -> tables.Table:
 
 
 def _present(
-    table: tables.Table, known: Properties, path: Path, problems: tables.Problems
+    table: tables.Table, known: Properties, path: Path, problems: Problems
 ) -> Properties | None:
     """Return the properties of the bodies of the table, None if some have none."""
     if "body" not in table.texts or not known.bodies:
@@ -105,7 +118,7 @@ def _present(
 
 
 def _recordings(
-    table: tables.Table, properties: Properties, problems: tables.Problems
+    table: tables.Table, properties: Properties, problems: Problems
 ) -> Iterator[Recording]:
     """Yield the pushes of a table in the order in which they first appear.
 
@@ -116,18 +129,19 @@ def _recordings(
     table.check(problems, checks.ANGLE, "angle")
     if not table.is_whole:
         return  # further checks would repeat the problems of the header and rows
-    units_fit = not ({checks.PLACE.name, checks.ANGLE.name} & problems.kinds)
     for push in _by_push(table, properties):
         recording = push.to_recording(problems) if push.is_sound(problems) else None
         if recording is None:
             continue
-        find = checks.recording_problems(recording, properties) if units_fit else None
-        for problem in find or checks.clock_problems(recording):
+        found = checks.clock_problems(recording)
+        if push.is_in_range:
+            found = checks.recording_problems(recording, properties)
+        problem = next(found, None)  # later problems may follow from the first
+        if problem:
             row = push.rows[problem.body][problem.sample]
             line = f"{table.where(row)}: {push.name}: {problem.text}."
-            problems.add(problem.kind, line)
-            break  # later problems may follow from the first
-        else:
+            problems.add(problem.kind, line, of_push=True)
+        elif push.is_in_range:
             yield recording
 
 
@@ -135,7 +149,10 @@ def _by_push(table: tables.Table, properties: Properties) -> Iterator["_Push"]:
     push, body = table.texts["push"], table.texts["body"]
     order = np.argsort(push.code, kind="stable")
     first = np.searchsorted(push.code[order], np.arange(len(push.names)))
+    lacks_value = table.lacks_value
     for code, rows in enumerate(np.split(order, first[1:])):
+        if lacks_value[rows].any():
+            continue  # which is a problem already
         own = [rows[body.code[rows] == body.names.index(n)] for n in properties.bodies]
         name = f"push {push.names[code][: tables.SHOWN]!r}"
         yield _Push(table, name, properties.bodies, own)
@@ -156,18 +173,25 @@ class _Push:
     def pusher(self, body: int) -> Float[np.ndarray, "sample 2"]:
         return np.column_stack([self.column(f"pusher_{axis}", body) for axis in "xy"])
 
-    def is_sound(self, problems: tables.Problems) -> bool:
+    @property
+    def is_in_range(self) -> bool:
+        """Whether all places and angles are in range; else a unit is mistaken."""
+        rows, numbers = np.concatenate(self.rows), self.table.numbers
+        places = np.abs([numbers[name][rows] for name in _PLACES])
+        angles = np.abs(numbers["angle"][rows])
+        return bool(
+            (places <= checks.PLACE.high).all() and (angles <= checks.ANGLE.high).all()
+        )
+
+    def is_sound(self, problems: Problems) -> bool:
         """Return whether all bodies have the same rising times and the same pusher."""
-        numbers = (self.column(n, b) for n in COLUMNS.numbers for b in self._indices)
-        if not all(np.isfinite(values).all() for values in numbers):
-            return False  # each of these values is a problem already
         first = next(body for body in self._indices if len(self.rows[body]))
         for body in self._indices:
             found = self._problem(first, body)
             if found:
                 kind, row, text = found
                 line = f"{self.table.where(row)}: {self.name}: {text}."
-                problems.add(kind, line)
+                problems.add(kind, line, of_push=True)
                 return False
         return True
 
@@ -209,7 +233,7 @@ class _Push:
             return "pusher", row, f"{text} time; repair one of them"
         return None
 
-    def to_recording(self, problems: tables.Problems) -> Recording | None:
+    def to_recording(self, problems: Problems) -> Recording | None:
         """Return the recording; None after adding a problem of its group."""
         surface = ""
         if "group" in self.table.texts:
@@ -218,7 +242,7 @@ class _Push:
             if other.any():
                 line = self.table.where(rows[np.argmax(other)])
                 line = f"{line}: {self.name} is in several groups; use one."
-                problems.add("groups", line)
+                problems.add("groups", line, of_push=True)
                 return None
             surface = group.names[group.code[rows[0]]]
         pose = np.stack(
@@ -229,6 +253,8 @@ class _Push:
             axis=1,
         )
         pose[..., 2] = np.unwrap(pose[..., 2], axis=0)
+        # A push has the same hash whatever the turn that its angles are counted in.
+        pose[..., 2] -= 2 * np.pi * np.rint(pose[0, :, 2] / (2 * np.pi))
         return Recording(
             time=self.column("time", 0),
             pose=pose,

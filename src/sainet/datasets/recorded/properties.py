@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sainet.datasets.recorded.tables import SHOWN, Problems
+from sainet.datasets.recorded.problems import Problems
+from sainet.datasets.recorded.tables import SHOWN
 from sainet.datasets.schema import Arrays
 from sainet.runs.documents import read_file
 from sainet.runs.errors import BadTable

@@ -9,59 +9,17 @@ from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from sainet.datasets.recorded.problems import MOST_PROBLEMS, Problems
 from sainet.runs.documents import read_file
 from sainet.runs.errors import BadTable
 from sainet.scenes.quantities import Quantity
 
 LARGEST = 1 << 30  # bytes
 MOST_ROWS = 20_000_000
-MOST_PROBLEMS = 8  # lines of one message
 SHOWN = 40  # characters of a quoted value
 _SEPARATORS = {";": "semicolons", "\t": "tabs"}
-
-
-class Problems:
-    """Problems of the files of one import: the first of each kind, one line each."""
-
-    def __init__(self) -> None:
-        """Begin without a problem."""
-        self._lines: dict[str, str] = {}
-
-    def add(self, kind: str, line: str) -> None:
-        """Add a problem unless one of its kind is there."""
-        self._lines.setdefault(kind, line)
-
-    def check(self, quantity: Quantity, value: float, where: str) -> bool:
-        """Return whether a value is in its range; if not, add the problem."""
-        try:
-            quantity.check(value, where, error=BadTable)
-        except BadTable as error:
-            self.add(quantity.name, str(error))
-            return False
-        return True
-
-    @property
-    def kinds(self) -> frozenset[str]:
-        """The kinds of problems that were found."""
-        return frozenset(self._lines)
-
-    def __bool__(self) -> bool:
-        """Return whether any problem was found."""
-        return bool(self._lines)
-
-    def raise_any(self) -> None:
-        """Raise `BadTable` if there are problems: one line each, at most eight."""
-        lines = list(self._lines.values())
-        if len(lines) > MOST_PROBLEMS:
-            more = len(lines) - MOST_PROBLEMS + 1
-            lines = [
-                *lines[: MOST_PROBLEMS - 1],
-                f"and {more} other kinds of problems.",
-            ]
-        if lines:
-            raise BadTable(*lines)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,13 +84,21 @@ class Table:
     line: Int[np.ndarray, " row"]  # of the file
     texts: dict[str, Texts]
     numbers: dict[str, Float[np.ndarray, " row"]]
-    is_whole: bool = True  # all columns, no row left out, no text empty
+    is_whole: bool = True  # all columns, no row left out
     row_name: str = "row {}"  # names a line in messages
 
     @property
     def rows(self) -> int:
         """The number of rows."""
         return len(self.line)
+
+    @property
+    def lacks_value(self) -> Bool[np.ndarray, " row"]:
+        """Whether a row has a number that is not finite, or an empty text."""
+        lacks = [~np.isfinite(values) for values in self.numbers.values()]
+        for text in self.texts.values():
+            lacks.append(~np.array([*map(bool, text.names)])[text.code])
+        return np.any(lacks, axis=0)
 
     def where(self, row: int | np.integer) -> str:
         """Return file and row as messages name them."""
@@ -145,9 +111,11 @@ class Table:
             if values is None:
                 continue
             outside = np.flatnonzero((values < quantity.low) | (values > quantity.high))
-            if len(outside):
-                row = int(outside[np.argmax(np.abs(values[outside]))])
-                problems.check(quantity, values[row], f"{self.where(row)}: {name}")
+            if len(outside) > MOST_PROBLEMS:  # a unit is mistaken
+                outside = outside[[np.argmax(np.abs(values[outside]))]]
+            for row in outside:
+                where = f"{self.where(row)}: {name}"
+                problems.check(quantity, values[row], where, of_push=True)
 
 
 def read_bytes(path: Path, *endings: str) -> bytes:
@@ -224,28 +192,41 @@ class _Reader:
 
     def read_row(self, line: int, fields: list[str]) -> None:
         where = f"{self.path}: row {line}"
-        if len(fields) != len(self.header):
-            self.is_whole = False
+        lacking = len(self.header) - len(fields)
+        is_cut = lacking > 0 and self._names_push(fields)
+        if lacking:
+            self.is_whole &= is_cut
             self.problems.add(
                 "fields",
                 f"{where}: has {len(fields)} fields, not {len(self.header)} as the "
                 "header has; it is cut or broken: repair or remove the row.",
+                of_push=is_cut,
             )
-            return
+            if not is_cut:
+                return
         if len(self.lines) == MOST_ROWS:
             raise BadTable(f"{self.path}: has over {MOST_ROWS} rows; split the file.")
         self.lines.append(line)
+        if is_cut:
+            # Its last field may be cut as well.
+            fields = [*fields[:-1], *[""] * (lacking + 1)]
         row = dict(zip(self.header, fields, strict=True))
         for name, (codes, names) in self.texts.items():
             text = row[name].strip()
-            if not text:
-                self.is_whole = False
-                self.problems.add(
-                    f"empty {name}", f"{where}: {name} is empty; write its name."
-                )
+            if not text and not is_cut:
+                is_of_push = name != self.columns.texts[0]
+                self.is_whole &= is_of_push
+                problem = f"{where}: {name} is empty; write its name."
+                self.problems.add(f"empty {name}", problem, of_push=is_of_push)
             codes.append(names.setdefault(text, len(names)))
         for name, values in self.numbers.items():
-            values.append(number(row[name], f"{where}: {name}", self.problems))
+            field = f"{where}: {name}"
+            values.append(np.nan if is_cut else number(row[name], field, self.problems))
+
+    def _names_push(self, fields: list[str]) -> bool:
+        """Return whether the first text, the push, is whole in a row that is cut."""
+        named = dict(zip(self.header, fields[:-1], strict=False))
+        return any(named.get(name, "").strip() for name in self.columns.texts[:1])
 
     def table(self) -> Table:
         return Table(
@@ -275,5 +256,6 @@ def number(text: str, where: str, problems: Problems) -> float:
         f"number {where.rpartition(': ')[2]}",
         f"{where} is {text[:SHOWN]!r}; it must be a finite number: repair or remove "
         "the row.",
+        of_push=True,
     )
     return np.nan

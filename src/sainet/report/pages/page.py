@@ -41,6 +41,16 @@ _NAMESPACES = {
 
 
 @dataclass(frozen=True, kw_only=True)
+class PlainTable:
+    """Table of texts; the first cell of a row names it."""
+
+    title: str
+    note: str = ""
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Report:
     """Contents of a report. Every string except the SVG of figures is escaped."""
 
@@ -50,6 +60,7 @@ class Report:
     table: Summary | None = None
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
+    plain_tables: Sequence[PlainTable] = ()
     replays: Sequence[Replay] = ()
     episodes: Sequence[EpisodeRecord] = ()
     manifest: Mapping[str, object] = field(default_factory=dict)
