@@ -214,6 +214,7 @@ TRUST = (
     "models/correctors/process",
     "cli/process",
     "evaluation/coverage",
+    "planning/expectation",
     "report/about_models",
     "studies/recorded_trust",
 )

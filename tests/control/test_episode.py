@@ -28,6 +28,7 @@ class Ahead(AbstractPlanner):
     """Always takes the first push, and predicts nothing."""
 
     actions: PushGrid = PushGrid()
+    expected: bool = False
 
     def search(self, problem):
         return Found((0,), 0.0, 0.0, 1)

@@ -60,6 +60,9 @@ class ControlConfig(RobotConfig):
     tolerance). The default leaves four standard deviations of measurement noise."""
     alignment: float = 3.0
     """Weight of the cosine distance in the heuristic (m)."""
+    expected_cost: bool = False
+    """Judge pushes by the mean cost over where the model expects the disks, of a model
+    with regions (a Gaussian process)."""
     deadline: float | None = None
     """Time limit of a decision of the tree planner (s), after which it returns the best
     plan so far. Default: none."""

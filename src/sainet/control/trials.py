@@ -26,9 +26,11 @@ from sainet.identification.adaptation import Adaptation, check_adapts
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
+from sainet.models.process_card import ProcessCard
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document
+from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
 from sainet.runs.workers import each_done
 from sainet.scenes.scene import TIME_STEP
@@ -122,7 +124,14 @@ def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     model.check_fits("robot", TIME_STEP)
     if config.adapt:
         check_adapts(model)
-    planner = make_planner(config.planner, deadline=config.deadline)
+    if config.expected_cost and not isinstance(model.card, ProcessCard):
+        raise BadInput(
+            f"`expected_cost` needs a model with regions; {model.name} has none, fit a "
+            "Gaussian process."
+        )
+    planner = make_planner(
+        config.planner, deadline=config.deadline, expected=config.expected_cost
+    )
     make_engine(config.world)
     return model, planner
 

@@ -14,12 +14,15 @@ PLANNERS = {
 }
 
 
-def make_planner(name: str, *, deadline: float | None = None) -> "AbstractPlanner":
+def make_planner(
+    name: str, *, deadline: float | None = None, expected: bool = False
+) -> "AbstractPlanner":
     """Return a planner with its default settings.
 
     Args:
         name: name of the planner.
         deadline: time after which the best plan so far is used, s; only for `tree`.
+        expected: weigh the cost that is expected where the model is not sure.
 
     Raises:
         UnknownName: no planner has this name.
@@ -27,7 +30,7 @@ def make_planner(name: str, *, deadline: float | None = None) -> "AbstractPlanne
     """
     planner = load_named("planner", PLANNERS, name)
     if deadline is None:
-        return planner()
+        return planner(expected=expected)
     if name != "tree":
         raise BadSetting("deadline", deadline, "None unless `planner` is tree")
-    return planner(deadline=deadline)
+    return planner(deadline=deadline, expected=expected)

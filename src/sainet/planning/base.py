@@ -43,6 +43,7 @@ class AbstractPlanner(eqx.Module):
     """A planner, which selects the next pushes; stateless between decisions."""
 
     actions: eqx.AbstractVar[PushGrid]
+    expected: eqx.AbstractVar[bool]  # judge by expected costs
 
     @abstractmethod
     def search(self, problem: Problem) -> Found:
@@ -67,7 +68,7 @@ class AbstractPlanner(eqx.Module):
         """
         check_purpose(dynamics, PathControls.kind, scene.time_step)
         gap = check_observation(scene, state)
-        problem = Problem(dynamics, task, scene, state, self.actions)
+        problem = Problem(dynamics, task, scene, state, self.actions, self.expected)
         found = self.search(problem)
         pushes = tuple(
             jax.tree.map(lambda x, i=i: x[i], problem.pushes) for i in found.actions

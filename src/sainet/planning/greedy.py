@@ -23,6 +23,7 @@ class GreedyPlanner(AbstractPlanner):
     """
 
     actions: PushGrid = PushGrid()
+    expected: bool = eqx.field(static=True, default=False)
     horizon: int = eqx.field(static=True, default=2)
     near_horizon: int = eqx.field(static=True, default=3)  # within 10 mm of the goal
     same: float = eqx.field(static=True, default=1e-3)  # m, below which states equal

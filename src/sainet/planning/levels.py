@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
+from sainet.planning.expectation import mean_over
 from sainet.runs.errors import Diverged
 from sainet.scenes.pushes import Push, PushGrid, command_path, place_pusher
 from sainet.scenes.scene import Scene
@@ -40,6 +41,8 @@ def every_push(
     scene: Scene,
     states: State,
     pushes: Push,
+    *,
+    expected: bool = False,
 ) -> Outcomes:
     """Return the outcome of every push from every state, until all bodies rest.
 
@@ -51,6 +54,8 @@ def every_push(
         scene: one scene, without a batch axis.
         states: states at rest, ``[state]``.
         pushes: candidate pushes, ``[push]``.
+        expected: whether cost and distance are means over where the model expects the
+            disks.
 
     Returns:
         The outcomes, ``[state, push]``, as NumPy arrays.
@@ -63,7 +68,8 @@ def every_push(
     if dynamics.on_host:  # the engine uses every core itself
         flat = _judge(shared, *jax.tree.map(jnp.asarray, (rows, each)))
     else:
-        flat = over_devices(_judge, shared, rows, each, most=_AT_ONCE)
+        judge = _judge_expected if expected else _judge
+        flat = over_devices(judge, shared, rows, each, most=_AT_ONCE)
     flat = jax.device_get(flat)
     return jax.tree.map(lambda x: x.reshape(count, actions, *x.shape[1:]), flat)
 
@@ -96,6 +102,25 @@ def _judge(
     return Outcomes(rest, cost, task.distance(rest), solved)
 
 
+def _judge_expected(
+    shared: tuple[AbstractDynamics, AbstractTask, Scene], states: State, pushes: Push
+) -> Outcomes:
+    """Return the outcomes with the cost and the distance that are expected."""
+    dynamics, task, scene = shared
+    found = _judge(shared, states, pushes)
+    scenes = batch_of(scene, states.angle.shape[0])
+    region = dynamics.region(
+        scenes, *command_path(scenes, states, pushes, steps=SETTLED_STEPS)
+    )
+    if region is None:
+        return found
+    possible = jnp.isfinite(found.cost)
+    return found._replace(
+        cost=jnp.where(possible, mean_over(region, task.cost, found.state), jnp.inf),
+        distance=mean_over(region, task.distance, found.state),
+    )
+
+
 def _has_room(scenes: Scene, states: State, pushes: Push) -> Bool[Array, " batch"]:
     """Return whether the pusher starts outside all disks."""
     start = place_pusher(scenes, states, pushes)
@@ -115,6 +140,7 @@ class Problem:
     scene: Scene  # without a batch axis
     state: State  # observed, at rest
     grid: PushGrid
+    expected: bool = False  # judge by means over where the model expects the disks
 
     @cached_property
     def pushes(self) -> Push:
@@ -128,7 +154,10 @@ class Problem:
 
     def expand(self, states: State) -> Outcomes:
         """Return the outcomes of every push from every state."""
-        return every_push(self.dynamics, self.task, self.scene, states, self.pushes)
+        return every_push(
+            *(self.dynamics, self.task, self.scene, states, self.pushes),
+            expected=self.expected,
+        )
 
     def first_level(self) -> "Level":
         """Return the sequences of one push."""

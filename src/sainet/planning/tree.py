@@ -20,6 +20,7 @@ class TreePlanner(AbstractPlanner):
     """
 
     actions: PushGrid = PushGrid()
+    expected: bool = eqx.field(static=True, default=False)
     beam: int = eqx.field(static=True, default=12)  # sequences that get a third push
     deadline: float | None = eqx.field(static=True, default=None)  # s
     block: int = eqx.field(static=True, default=12)  # first pushes per deadline check
