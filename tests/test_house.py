@@ -215,6 +215,7 @@ TRUST = (
     "cli/process",
     "evaluation/coverage",
     "planning/expectation",
+    "studies/expected_cost",
     "report/about_models",
     "studies/recorded_trust",
 )

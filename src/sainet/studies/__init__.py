@@ -21,6 +21,7 @@ STUDIES = {
     "robustness": "sainet.studies.robustness:STUDY",
     "simulated-control": "sainet.studies.simulated_control:STUDY",
     "adaptation": "sainet.studies.adaptation:STUDY",
+    "expected-cost": "sainet.studies.expected_cost:STUDY",
     "engine-parity": "sainet.studies.engine_parity:STUDY",
     "robot-planar": "sainet.studies.paper_tables:ROBOT_PLANAR",
     "pretrained": "sainet.studies.pretrained:STUDY",

@@ -18,7 +18,7 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.runner import Bar, Runner
-from sainet.studies.steps import Join, Load, Step, Train
+from sainet.studies.steps import Join, Load, Step
 from sainet.studies.study import Plan, Scope, Study
 
 TRIALS = {"quick": 4, "paper": 100}
@@ -31,7 +31,7 @@ _FACTORS = ("world", "goals", "planner", "given_properties", "disks")
 class RunTrials(Step[Measurements]):
     """Control trials of models on the same goals."""
 
-    models: tuple[Step[Model], ...]  # shipped, or trained by a step
+    models: tuple[Step[Model], ...]  # loaded by name, or made by a step
     config: ControlConfig  # of every model
     condition: Condition
 
@@ -45,7 +45,7 @@ class RunTrials(Step[Measurements]):
         records = {}
         for step in self.models:
             model = runner.result(step)
-            source = str(model.folder) if isinstance(step, Train) else model.name
+            source = model.name if isinstance(step, Load) else str(model.folder)
             config = replace(self.config, model=source)
             title = f"Pushing ({model.name}, {self.name})"
             with runner.bar(title, config.trials) as bar:

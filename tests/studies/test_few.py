@@ -1,0 +1,64 @@
+"""Studies of few recorded pushes, tiny and on made-up ones."""
+
+import numpy as np
+import pytest
+
+from learning.stores import end_points_alone, info_of, made_up, write
+from sainet.studies import load_study, recorded_active, recorded_few
+from sainet.studies.runner import Runner
+from sainet.studies.study import STEPS, Scope
+
+PUSHES = 48
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Pushes of one disk that start at many places, in pairs of repeats."""
+    info = info_of(
+        PUSHES,
+        engine="recorded",
+        seed=None,
+        bodies=1,
+        steps=40,
+        groups=("felt-10",),
+        has_repeats=True,
+    )
+    arrays = end_points_alone(made_up(info))
+    arrays |= {"repeat": np.repeat(np.arange(PUSHES // 2), 2)}
+    names = ("table_friction", "disk_friction", "pusher_friction")
+    arrays |= dict.fromkeys(names, np.full(PUSHES, 0.3))
+    return write(tmp_path_factory.mktemp("few") / "data", info, arrays).path
+
+
+def test_orders_begin_alike_and_are_tested_on_other_kinds(
+    recorded, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(recorded_active, "DRAWS", {"quick": 1})
+    monkeypatch.setattr(recorded_active, "COUNTS", {"quick": (12, 18)})
+    study, scope = load_study("recorded-active"), Scope("quick", recorded)
+    step = study.plan(scope).measured
+    measured = Runner(tmp_path / STEPS).result(step)
+    assert [c.label for c in measured.header.conditions] == ["12", "18"]
+    first, later = (measured.data["condition"].values == n for n in (0, 1))
+    random, chosen = (
+        measured.values("final_pos_mm", name)[..., :, 0].ravel()
+        for name in ("at-random", "chosen")
+    )
+    assert (random[first] == chosen[first]).all()  # of the same pushes
+    assert (random[later] != chosen[later]).any()
+    physics = measured.values("final_pos_mm", "physics-identified").ravel()
+    assert (physics[first] == physics[later]).all()
+    assert first.sum() == PUSHES / 4
+
+
+def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
+    monkeypatch.setattr(recorded_few, "COUNTS", {"quick": (6, 10)})
+    study = load_study("recorded-few")
+    parts = study.plan(Scope("quick", recorded)).measured.parts
+    fewer, more = (
+        [set(step.engine.pushes.store.rows) for step in part.parts] for part in parts
+    )
+    assert [len(rows) for rows in fewer] == [6, 6]
+    assert all(one < other for one, other in zip(fewer, more, strict=True))
+    tests = [set(step.pushes.store.rows) for step in parts[0].parts]
+    assert not any(rows & held for rows, held in zip(more, tests, strict=True))
