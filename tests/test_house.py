@@ -236,6 +236,7 @@ CHOOSING = (
     "studies/recorded_active",
     "studies/recorded_few",
 )
+ENSEMBLES = ("models/ensemble", "learning/ensemble")
 ADAPTATION = ("identification/adaptation", "studies/adaptation")
 
 ENGINEER = (
@@ -258,7 +259,7 @@ def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
 
 ADDED = modules_of(ROBOTS)
 LATER = ADDED + modules_of(
-    WAY_IN + TRUST + VALIDATION + ADAPTATION + CHOOSING + ENGINEER
+    WAY_IN + TRUST + VALIDATION + ADAPTATION + CHOOSING + ENGINEER + ENSEMBLES
 )
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
@@ -267,6 +268,7 @@ CONNECTIONS = {
     "adaptation": 25,
     "units and bad pushes of tables": 35,
     "expected costs in planners": 40,
+    "ensembles": 62,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -311,6 +313,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(CHOOSING))),
         400,
         400,
+    ),
+    "code lines of ensembles": (
+        lambda: sum(map(code_lines, modules_of(ENSEMBLES))),
+        350,
+        350,
     ),
     "code lines of adaptation": (
         lambda: sum(map(code_lines, modules_of(ADAPTATION))),

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 Given = Mapping[str, object]
 _OF_PROCESSES = {"features", "iterations", "seed"}
-_UNUSED = {"start": FROM_ENGINE, "devices": None}  # options, as they are without use
+_UNUSED = {
+    "start": FROM_ENGINE,
+    "devices": None,
+    "members": None,
+}  # options, as they are without use
 
 
 @dataclass(frozen=True)

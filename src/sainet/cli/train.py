@@ -2,7 +2,7 @@
 
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import AvoidSubcommands, Positional
 
@@ -11,6 +11,9 @@ from sainet.cli.output import Json, Output, progress_bar
 from sainet.learning.recipes import PAPER, Recipe, SingleSteps
 from sainet.models.identity import ModelKind
 from sainet.runs.errors import BadInput
+
+if TYPE_CHECKING:
+    from sainet.datasets.store import Store
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +42,10 @@ class Train:
     start_from: str | None = None
     """Not an option of this command: use 'sainet tune --start' (default: random
     weights)."""
+    members: int | None = None
+    """Networks of an ensemble, of consecutive seeds; their mean predicts, and their
+    disagreement gives 90 % regions, calibrated on a fifth of the pushes (default: a
+    single network, without regions)."""
     recipe: Annotated[Recipe, AvoidSubcommands] = PAPER
     devices: int | None = None
     """CPU devices to split each batch over (default: one per core)."""
@@ -65,6 +72,7 @@ class Train:
             self.assumed_engine,
             group=self.group,
             pushes=self.pushes,
+            members=self.members,
         ).run(recipe, self.devices, self.output)
 
 
@@ -79,6 +87,7 @@ class Job:
     _: KW_ONLY
     group: str | None  # None: all
     pushes: int | None  # from the start of the dataset; None: all
+    members: int | None  # of an ensemble; None: a single network
 
     def run(self, recipe: Recipe, devices: int | None, output: Output) -> Json:
         """Train the network, with a progress bar, and draw its learning curve.
@@ -96,6 +105,8 @@ class Job:
         store = store if self.group is None else store.of_group(self.group)
         store = store if self.pushes is None else store.first(self.pushes)
         name, total = self.model.upper(), recipe.optimiser.iterations
+        if self.members is not None:
+            return self._ensemble(store, recipe, output)
         with progress_bar(f"Training {name}", total, output) as advance:
             result = fit(
                 self.model,
@@ -110,3 +121,23 @@ class Job:
         )
         output.say(f"{name} is in {self.out}, its learning curve in {curve}")
         return {"out": str(self.out), "model": self.model, "loss": result.loss}
+
+    def _ensemble(self, store: "Store", recipe: Recipe, output: Output) -> Json:
+        """Train the members, and calibrate their regions."""
+        from sainet.learning.ensemble import fit_ensemble
+        from sainet.learning.log import reported
+
+        count = self.members or 0
+        name, total = f"{count} {self.model.upper()}", recipe.optimiser.iterations
+        with progress_bar(f"Training {name}", count * total, output) as advance:
+            loss = fit_ensemble(
+                self.model,
+                store,
+                recipe,
+                self.out,
+                members=count,
+                assumed_engine=self.engine,
+                on_step=reported(advance),
+            )
+        output.say(f"The ensemble is in {self.out}")
+        return {"out": str(self.out), "model": self.model, "loss": loss}

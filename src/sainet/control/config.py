@@ -62,7 +62,7 @@ class ControlConfig(RobotConfig):
     """Weight of the cosine distance in the heuristic (m)."""
     expected_cost: bool = False
     """Judge pushes by the mean cost over where the model expects the disks, of a model
-    with regions (a Gaussian process)."""
+    with regions (a Gaussian process or an ensemble)."""
     deadline: float | None = None
     """Time limit of a decision of the tree planner (s), after which it returns the best
     plan so far. Default: none."""

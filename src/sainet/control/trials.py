@@ -26,7 +26,6 @@ from sainet.identification.adaptation import Adaptation, check_adapts
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
-from sainet.models.process_card import ProcessCard
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document
@@ -124,10 +123,10 @@ def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     model.check_fits("robot", TIME_STEP)
     if config.adapt:
         check_adapts(model)
-    if config.expected_cost and not isinstance(model.card, ProcessCard):
+    if config.expected_cost and not model.dynamics.has_regions:
         raise BadInput(
             f"`expected_cost` needs a model with regions; {model.name} has none, fit a "
-            "Gaussian process."
+            "Gaussian process or train an ensemble."
         )
     planner = make_planner(
         config.planner, deadline=config.deadline, expected=config.expected_cost

@@ -14,6 +14,7 @@ from sainet.engines.simulator import InternalEngine, SimulatorSpec
 from sainet.runs.errors import Diverged
 from sainet.scenes.controls import CONTROLS, Controls, Pusher
 from sainet.scenes.quantities import PROPERTIES
+from sainet.scenes.recording import CameraOffset
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
 
@@ -39,6 +40,14 @@ class PushBatch(eqx.Module):
     def is_observed(self) -> Bool[Array, " push"]:
         """Whether any step of each push was observed."""
         return jnp.any(self.pose_observed | self.rate_observed, axis=-1)
+
+    def seen_by(self, camera: CameraOffset) -> "PushBatch":
+        """Return the batch with the pusher where a camera would measure it."""
+        if not camera:
+            return self
+        offset = jnp.array(camera.vector)
+        initial = self.initial.with_pusher_moved(offset)
+        return replace(self, initial=initial, controls=self.controls.moved(offset))
 
 
 def to_batch(
@@ -145,8 +154,7 @@ class Prediction:
         slug = self.internal.simulator.stored_as
         arrays = self.complete(arrays)
         batch = to_batch(arrays, self.info, steps=steps, simulated=slug)
-        moved = _as_measured(self.internal, batch.initial, batch.controls)
-        return replace(batch, initial=moved[0], controls=moved[1])
+        return batch.seen_by(self.internal.camera)
 
 
 def simulate(

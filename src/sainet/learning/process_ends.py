@@ -59,10 +59,8 @@ def inputs_of(
             f"{store.path}: {store.info.kind} pushes of {store.info.bodies} disk(s), "
             f"the process is of robot pushes of {disks}; give such pushes."
         )
-    batch, offset = to_batch(store.read(slice(None)), store.info), camera.vector
-    initial = batch.initial.with_pusher_moved(jnp.array(offset))
-    controls = batch.controls.moved(jnp.array(offset))
-    found = _inputs(replace(batch, initial=initial, controls=controls))
+    batch = to_batch(store.read(slice(None)), store.info)
+    found = _inputs(batch.seen_by(camera))
     return np.stack([np.asarray(found[name], np.float64) for name in names], axis=1)
 
 

@@ -43,6 +43,11 @@ class AbstractDynamics(eqx.Module):
         """The pushes that its corrector is for; None without a corrector."""
         return None
 
+    @property
+    def has_regions(self) -> bool:
+        """Whether `region` states where pushes end."""
+        return False
+
     def recall(
         self, hashes: Callable[[], Hashes], steps: int, bodies: int
     ) -> np.ndarray | None:
@@ -155,6 +160,11 @@ class SimulatorAugmented(AbstractDynamics):
     def made_for(self) -> Purpose:
         """The pushes that the corrector is for."""
         return self.network.made_for
+
+    @property
+    def has_regions(self) -> bool:
+        """Whether the corrector states regions."""
+        return self.network.has_regions
 
     def begin(self, scene: Scene, state: State) -> Start:
         """Start both predictions at the state (eq. 2: s-bar0 = s-hat0 = s0)."""

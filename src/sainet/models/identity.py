@@ -14,7 +14,7 @@ TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "re
 ModelKind = Literal["in", "sain"]  # of networks
 Features = Literal["paper", "place"]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
-Variant = Literal["", "bystander", "single-steps", "for-all"]
+Variant = Literal["", "bystander", "single-steps", "for-all", "ensemble"]
 
 NETWORKS = get_args(ModelKind)
 LEARNED = (*NETWORKS, "gp")

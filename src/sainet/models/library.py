@@ -26,12 +26,15 @@ from sainet.models.card import (
     read_identified,
 )
 from sainet.models.checkpoint import load_network
+from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.dynamics import (
     AbstractDynamics,
     LearnedDynamics,
     PhysicsDynamics,
     SimulatorAugmented,
 )
+from sainet.models.ensemble import Ensemble, stacked
+from sainet.models.ensemble_card import is_ensemble, load_ensemble, member
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessCard, is_process, load_process
@@ -104,20 +107,41 @@ def load_model(
     folder = network_folder(name)
     if is_identified(folder):
         return _identified_physics(folder, engine, order)
-    load = load_process if is_process(folder) else load_network
-    network, card = load(folder)
+    calibration = None
+    if is_ensemble(folder):
+        network, card, found = load_ensemble(folder)
+        calibration = found.calibration
+    else:
+        load = load_process if is_process(folder) else load_network
+        network, card = load(folder)
     dynamics: AbstractDynamics = LearnedDynamics(network)
-    internal = None
+    internal = built = None
     if card.identity.simulator is not None:
         simulator = _internal(folder, card, card.identity.simulator, engine, force)
         simulator = _ordered(simulator, order)
-        internal = InternalEngine(simulator, card.camera)
-        dynamics = SimulatorAugmented(network, simulator.build())
+        internal, built = InternalEngine(simulator, card.camera), simulator.build()
+        dynamics = SimulatorAugmented(network, built)
+    if calibration is not None:
+        assert isinstance(network, InteractionNetwork)
+        dynamics = Ensemble(network, built, calibration)
     if card.has_single_steps:
         dynamics, internal = _restarted(folder, dynamics), None
     dynamics = with_camera(dynamics, card.camera)
     identity = named(card.identity, folder)
     return Model(identity, dynamics, card, folder, card.weights, internal)
+
+
+def load_members(folder: Path, count: int) -> tuple[Ensemble, list[Card]]:
+    """Return the networks in a folder as an ensemble without regions, and their cards.
+
+    Raises:
+        BadCheckpoint: one is missing or damaged.
+    """
+    loaded = [load_network(member(folder, number)) for number in range(count)]
+    networks, cards = zip(*loaded, strict=True)
+    internal = cards[0].internal
+    engine = internal and internal.simulator.build()
+    return Ensemble(stacked([*networks]), engine or None), [*cards]
 
 
 def named(identity: ModelId, folder: Path) -> ModelId:

@@ -35,6 +35,11 @@ class OffsetCamera(AbstractDynamics):
         """The purpose of the network in the wrapped model; None without a network."""
         return self.dynamics.made_for
 
+    @property
+    def has_regions(self) -> bool:
+        """Whether the wrapped model states regions."""
+        return self.dynamics.has_regions
+
     def begin(self, scene: Scene, state: State) -> Carry:
         """Return the carry of the wrapped model at the state."""
         return self.dynamics.begin(scene, state.with_pusher_moved(self._offset))

@@ -61,6 +61,11 @@ class AbstractCorrector(eqx.Module):
     def made_for(self) -> Purpose:
         """The pushes that the corrector is for."""
 
+    @property
+    def has_regions(self) -> bool:
+        """Whether `region` states where pushes end."""
+        return False
+
     @abstractmethod
     def correct(
         self,

@@ -155,6 +155,11 @@ class ResidualProcess(AbstractCorrector):
         """Pushes along paths."""
         return Purpose("robot", self.time_step)
 
+    @property
+    def has_regions(self) -> bool:
+        """True: a process knows how sure it is."""
+        return True
+
     def correct(
         self,
         scene: Scene,

@@ -1,0 +1,166 @@
+"""Training of ensembles: networks of different seeds, and a calibration of regions."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import equinox as eqx
+import jax.numpy as jnp
+import msgspec
+import numpy as np
+from jaxtyping import Array, Float
+
+from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.splits import last_known, split_rows
+from sainet.datasets.store import Store
+from sainet.learning.fit import fit
+from sainet.learning.log import read_log
+from sainet.learning.process import quantile
+from sainet.learning.recipes import Recipe, SingleSteps
+from sainet.models.ensemble import Ensemble
+from sainet.models.ensemble_card import ENSEMBLE, MEMBERS, EnsembleCard, member
+from sainet.models.identity import ModelKind
+from sainet.models.library import load_members
+from sainet.runs.digests import digests_to_text
+from sainet.runs.documents import write_document
+from sainet.runs.errors import BadSetting, BadStore
+from sainet.runs.folders import open_run
+from sainet.scenes.geometry import rotate
+
+CALIBRATION = 0.2  # share of the pushes that no member is trained on
+_FEWEST = 10  # of these pushes: the quantile of fewer is their maximum
+_LEAST = 0.01  # of the variance of errors, that of a floor
+_TINY = 1e-9  # m and rad
+_BATCH = 256  # pushes at a time
+
+
+def fit_ensemble(
+    model: ModelKind,
+    store: Store,
+    recipe: Recipe,
+    out: Path,
+    *,
+    members: int,
+    assumed_engine: str = "planar",
+    on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
+) -> float | None:
+    """Train networks of consecutive seeds, then calibrate the regions of their mean.
+
+    A fifth of the pushes, whole kinds at a time, is kept from all members. An
+    identical call resumes.
+
+    Args:
+        model: `in` or `sain`.
+        store: training data.
+        recipe: of each member; the first has its seed.
+        out: run folder, with a folder for each member.
+        members: number of networks.
+        assumed_engine: see `fit`.
+        on_step: called with the iterations of all members so far, and the last loss.
+
+    Returns:
+        The mean of the last losses.
+
+    Raises:
+        BadSetting: too few or too many members, or networks of single steps.
+        BadStore: the pushes do not suffice to calibrate.
+        RunConflict: the folder belongs to another run.
+    """
+    low, high = MEMBERS
+    if not low <= members <= high:
+        raise BadSetting("members", members, f"from {low} to {high}")
+    if isinstance(recipe.horizon, SingleSteps):
+        raise BadSetting("members", members, "left out for networks of single steps")
+    rest, held = split_rows(store.repeats(), CALIBRATION, recipe.seed)
+    if len(held) < _FEWEST:
+        raise BadStore(
+            f"{store.path}: {store.info.pushes} pushes, of which {len(held)} would "
+            f"calibrate the ensemble; it needs at least {_FEWEST} of these."
+        )
+    objective = recipe.objective.for_pushes(len(rest))
+    settings = msgspec.to_builtins(recipe.changed(l2=objective.l2).settings())
+    config = {"command": "train", "model": model, "members": members}
+    config |= {"data": store.content, "engine": str(assumed_engine), **settings}
+    folder = open_run(out, config, finished_by=ENSEMBLE)
+    training, total = store.take(np.sort(rest)), recipe.optimiser.iterations
+    for number in range(members):
+        fit(
+            model,
+            training,
+            recipe.changed(seed=recipe.seed + number),
+            member(out, number),
+            assumed_engine=assumed_engine,
+            on_step=lambda n, loss, number=number: on_step(number * total + n, loss),
+        )
+    logs = [read_log(member(out, number)) for number in range(members)]
+    losses = [log[-1].loss for log in logs if log]
+    loss = float(np.mean(losses)) if losses else None
+    if not folder.is_finished:
+        found = _calibrated(out, members, store.take(np.sort(held)))
+        pushes = digests_to_text(store.push_hashes())
+        card = msgspec.structs.replace(found, pushes=pushes, final_loss=loss)
+        write_document(out / ENSEMBLE, card)
+    return loss
+
+
+def _calibrated(out: Path, members: int, held: Store) -> EnsembleCard:
+    """Return the card of finished members, calibrated on pushes that none saw."""
+    dynamics, cards = load_members(out, members)
+    parts = []
+    for start in range(0, held.info.pushes, _BATCH):
+        rows = range(start, min(start + _BATCH, held.info.pushes))
+        arrays = held.take(rows).read(slice(None))
+        batch = to_batch(arrays, held.info).seen_by(cards[0].camera)
+        parts.append(_missed_and_spread(dynamics, batch))
+    missed, spread = (np.concatenate(each) for each in zip(*parts, strict=True))
+    known = np.isfinite(missed).all(axis=(1, 2))
+    missed, spread = missed[known], spread[known]
+    if len(missed) < _FEWEST:
+        raise BadStore(
+            f"{held.path}: the ends of {len(missed)} pushes were observed that would "
+            f"calibrate the ensemble; it needs at least {_FEWEST}."
+        )
+    variance, own = (np.mean(each**2, axis=0) for each in (missed, spread))
+    lacking = np.maximum(variance - own, _LEAST * variance)
+    floor = np.sqrt(np.stack([lacking[:, :2].mean(axis=1), lacking[:, 2]], axis=-1))
+    floor = np.maximum(floor, _TINY)
+    wide = floor[:, [0, 0, 1]]
+    scaled = missed / np.sqrt(spread**2 + wide**2)
+
+    def sizes(off: np.ndarray) -> Float[np.ndarray, "push body 2"]:
+        place = np.hypot(off[..., 0], off[..., 1])
+        return np.maximum(np.stack([place, np.abs(off[..., 2])], axis=-1), _TINY)
+
+    def listed(values: np.ndarray) -> tuple[tuple[float, float], ...]:
+        return tuple((float(one), float(other)) for one, other in values)
+
+    return EnsembleCard(
+        members=tuple(card.weights for card in cards),
+        floor=listed(floor),
+        reach=listed(quantile(sizes(scaled))),
+        plain=listed(quantile(sizes(missed))),
+        calibrated_on=len(missed),
+        pushes="",
+    )
+
+
+@eqx.filter_jit
+def _ends(dynamics: Ensemble, batch: PushBatch) -> tuple[Array, Array, Array]:
+    """Return mean poses, the deviations of final poses, and headings of pushes."""
+    begun = dynamics.begin(batch.scene, batch.initial)
+    states = dynamics.advance(batch.scene, begun, batch.controls)[1].states
+    pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+    found = dynamics.spread(batch.scene, batch.initial, batch.controls)
+    spread = jnp.concatenate([found.place, found.turn[..., None]], axis=-1)
+    return pose, spread, found.heading
+
+
+def _missed_and_spread(
+    dynamics: Ensemble, batch: PushBatch
+) -> tuple[Float[np.ndarray, "push body 3"], Float[np.ndarray, "push body 3"]]:
+    """Return errors of final poses in the frame of the push, and deviations."""
+    pose, spread, heading = _ends(dynamics, batch)
+    seen = np.asarray(batch.pose_observed)
+    off = last_known(np.asarray(batch.truth[..., :3] - pose, np.float64), seen)
+    along = np.asarray(rotate(jnp.asarray(off[..., :2]), -heading[:, None]))
+    turned = np.mod(off[..., 2:] + np.pi, 2 * np.pi) - np.pi
+    return np.concatenate([along, turned], axis=-1), np.asarray(spread, np.float64)

@@ -1,0 +1,180 @@
+"""Ensembles: the mean of their members, their regions, their files and refusals."""
+
+import json
+import shutil
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import sainet as sn
+from learning.stores import info_of, made_up, write
+from sainet.cli.entry import run
+from sainet.datasets.batch import to_batch
+from sainet.datasets.splits import split_rows
+from sainet.evaluation.coverage import coverage_of
+from sainet.evaluation.evaluate import evaluate
+from sainet.learning.ensemble import CALIBRATION, fit_ensemble
+from sainet.learning.fit import fit
+from sainet.learning.recipes import PAPER, SingleSteps
+from sainet.models.dynamics import predict
+from sainet.models.ensemble_card import ENSEMBLE, member
+from sainet.models.library import load_model
+from sainet.runs.errors import BadCheckpoint, BadSetting, BadStore
+from sainet.scenes.pushes import command_path
+from sainet.scenes.state import pack_motion
+
+PUSHES, MEMBERS = 60, 3
+RECIPE = PAPER.changed(iterations=3, batch_size=8, steps=12, log_every=1)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    info = info_of(PUSHES)
+    return write(tmp_path_factory.mktemp("pushes") / "data", info, made_up(info))
+
+
+@pytest.fixture(scope="module", params=["in", "sain"])
+def folder(request, store, tmp_path_factory):
+    out = tmp_path_factory.mktemp("ensemble") / request.param
+    fit_ensemble(request.param, store, RECIPE, out, members=MEMBERS)
+    return out
+
+
+@pytest.fixture(scope="module")
+def batch(store):
+    return to_batch(store.read(slice(5)), store.info)
+
+
+def motion(model, batch):
+    states = predict(model.dynamics, batch.scene, batch.initial, batch.controls).states
+    return np.asarray(pack_motion(states))
+
+
+def test_the_mean_of_the_members_is_predicted(folder, batch):
+    each = [motion(load_model(str(member(folder, n))), batch) for n in range(MEMBERS)]
+    assert np.ptp(np.stack(each), axis=0).max() > 1e-4
+    found = motion(load_model(str(folder)), batch)
+    assert np.allclose(found, np.mean(each, axis=0), atol=1e-5)
+
+
+def test_two_advances_are_one_long_one(folder, batch):
+    dynamics = load_model(str(folder)).dynamics
+    whole = motion(load_model(str(folder)), batch)
+    carry, parts = dynamics.begin(batch.scene, batch.initial), []
+    for part in (slice(0, 5), slice(5, None)):
+        controls = jax.tree.map(lambda x, part=part: x[:, part], batch.controls)
+        carry, trajectory = dynamics.advance(batch.scene, carry, controls)
+        parts.append(np.asarray(pack_motion(trajectory.states)))
+    assert np.allclose(np.concatenate(parts, axis=1), whole, atol=1e-5)
+
+
+def test_regions_hold_the_pushes_that_calibrated_them(folder, store):
+    """Of 12 pushes, the quantile is the largest score, of a push on the boundary."""
+    _, held = split_rows(store.repeats(), CALIBRATION, RECIPE.seed)
+    card = json.loads((folder / ENSEMBLE).read_text())
+    assert card["calibrated_on"] == len(held) == PUSHES / 5
+    tests = store.take(np.sort(held))
+    found = coverage_of(evaluate([load_model(str(folder))], tests, force=True))
+    assert {each.kind for each in found} == {"pos", "rot"}
+    assert all(each.inside.value > 90 for each in found)
+    assert all(each.size.value > 0 for each in found)
+
+
+def test_regions_grow_with_disagreement(folder, batch):
+    dynamics = load_model(str(folder)).dynamics
+    given = batch.scene, batch.initial, batch.controls
+    spread, region = dynamics.spread(*given), dynamics.region(*given)
+    ends = [
+        load_model(str(member(folder, n))).dynamics.advance(
+            batch.scene,
+            load_model(str(member(folder, n))).dynamics.begin(*given[:2]),
+            batch.controls,
+        )[1]
+        for n in range(MEMBERS)
+    ]
+    angles = np.stack([np.asarray(each.final.angle) for each in ends])
+    assert np.allclose(spread.turn, angles.std(axis=0), atol=1e-5)
+    places = np.stack([np.asarray(each.final.position) for each in ends])
+    assert np.allclose(
+        np.sum(np.asarray(spread.place) ** 2, axis=-1),
+        np.sum(places.var(axis=0), axis=-1),
+        atol=1e-7,
+    )
+    order = np.argsort(np.asarray(spread.turn)[:, 0])
+    assert (np.diff(np.asarray(region.turn)[order, 0]) >= 0).all()
+
+
+def test_no_member_is_trained_on_the_pushes_of_the_calibration(folder, store):
+    trained = [load_model(str(member(folder, n))).card.trained_pushes for n in range(3)]
+    assert trained == [PUSHES * 4 / 5] * MEMBERS
+    with pytest.raises(BadCheckpoint, match=f"{ENSEMBLE}.*ensemble was trained on 60"):
+        evaluate([load_model(str(folder))], store)
+
+
+def test_members_are_networks_of_consecutive_seeds(folder, store, tmp_path):
+    rest, _ = split_rows(store.repeats(), CALIBRATION, RECIPE.seed)
+    alone = RECIPE.changed(seed=RECIPE.seed + 1)
+    fit(folder.name, store.take(np.sort(rest)), alone, tmp_path / "alone")
+    wanted = load_model(str(tmp_path / "alone")).card.weights
+    assert load_model(str(member(folder, 1))).card.weights == wanted
+
+
+def test_an_identical_call_changes_nothing(folder, store):
+    before = {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
+    fit_ensemble(folder.name, store, RECIPE, folder, members=MEMBERS)
+    assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()} == before
+
+
+def test_edited_ensembles_are_refused(folder, tmp_path):
+    for name, value, message in (
+        ("members", ["0" * 64] * MEMBERS, "members.0. is another hash"),
+        ("reach", [[1.0, 1.0]], "differ in their numbers"),
+        ("floor", [[0.0, 1.0]] * 2, "floor"),
+    ):
+        other = shutil.copytree(folder, tmp_path / name)
+        card = json.loads((other / ENSEMBLE).read_text())
+        (other / ENSEMBLE).write_text(json.dumps(card | {name: value}))
+        with pytest.raises(BadCheckpoint, match=message):
+            load_model(str(other))
+    other = shutil.copytree(folder, tmp_path / "missing")
+    shutil.rmtree(member(other, 2))
+    with pytest.raises(BadCheckpoint, match="member-2"):
+        load_model(str(other))
+
+
+def test_impossible_ensembles_are_refused(store, tmp_path):
+    with pytest.raises(BadSetting, match="members. is 1"):
+        fit_ensemble("in", store, RECIPE, tmp_path / "a", members=1)
+    single = RECIPE.changed(horizon=SingleSteps(steps=12))
+    with pytest.raises(BadSetting, match="single steps"):
+        fit_ensemble("in", store, single, tmp_path / "b", members=2)
+    with pytest.raises(BadStore, match="4 would calibrate"):
+        fit_ensemble("in", store.first(20), RECIPE, tmp_path / "c", members=2)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_trains_an_ensemble_that_plans(store, tmp_path, capsys):
+    words = ["train", "in", "--data", str(store.path), "--out", str(tmp_path / "out")]
+    given = ["--iterations", "2", "--batch-size", "8", "--members", "2", "--json"]
+    assert run([*words, *given]) == 0
+    assert json.loads(capsys.readouterr().out)["model"] == "in"
+    model = load_model(str(tmp_path / "out"))
+    assert model.dynamics.has_regions
+    assert "ensemble" in model.id.label or model.name == "out"
+
+
+def test_other_numbers_of_disks_have_no_regions(folder):
+    dynamics = load_model(str(folder)).dynamics
+    scene = sn.Scene.disks([1.0] * 3, [0.05] * 3)
+    three, push = scene.in_a_row(), sn.Push(0.1)
+    given = jax.tree.map(lambda x: jnp.asarray(x)[None], (scene, three, push))
+    initial, controls = command_path(*given, steps=12)
+    assert dynamics.region(given[0], initial, controls) is None
+
+
+def test_a_process_has_no_members(store, tmp_path, capsys):
+    words = ["tune", "gp", "--data", str(store.path), "--out", str(tmp_path / "gp")]
+    assert run([*words, "--members", "3"]) == 2
+    assert "members" in capsys.readouterr().err
