@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
+from sainet.evaluation.joining import join
+from sainet.evaluation.measurements import Header, Measurements, measurements_of
+from sainet.evaluation.metrics import MEASURED
 from sainet.studies import load_study, recorded_active, recorded_few
+from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
+from sainet.studies.data_efficiency import of_pushes
 from sainet.studies.runner import Runner
 from sainet.studies.study import STEPS, Scope
 
@@ -62,3 +67,30 @@ def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
     assert all(one < other for one, other in zip(fewer, more, strict=True))
     tests = [set(step.pushes.store.rows) for step in parts[0].parts]
     assert not any(rows & held for rows, held in zip(more, tests, strict=True))
+
+
+def test_the_saving_is_where_the_curves_meet():
+    """Errors 40 / count at random, 20 / count when chosen: half as many pushes."""
+    counts, draws, tests = (25, 50, 100, 200), 6, 5
+    parts = []
+    for count in counts:
+        errors = np.empty((3, 1, draws * tests, 1))
+        errors[0], errors[1], errors[2] = 1.0, 40 / count, 20 / count
+        header = Header(
+            models=(PHYSICS_IDENTIFIED, recorded_active.RANDOM, recorded_active.CHOSEN)
+        )
+        part = measurements_of(
+            dict.fromkeys(MEASURED, errors),
+            np.ones((draws * tests, 1)),
+            header,
+            condition=np.zeros(draws * tests),
+            row=np.arange(draws * tests),
+        )
+        parts.append(part.in_condition(of_pushes(count)))
+    whole = join(parts)
+    folds = np.tile(np.repeat(np.arange(draws), tests), len(counts)).astype(np.int32)
+    data = whole.data.assign_coords(fold=("sample", folds))
+    found = recorded_active.pushes_for_the_last(
+        Measurements(data, whole.header), "final_pos_mm"
+    )
+    assert found.value == found.low == found.high == pytest.approx(100)

@@ -38,6 +38,7 @@ from sainet.studies.evidence import (
     keep,
 )
 from sainet.studies.page_figures import draw_figures
+from sainet.studies.recorded_active import saving
 from sainet.studies.study import Choice
 
 TEMPLATES, PAGES = "docs/templates", "docs/results"
@@ -72,6 +73,7 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "readings": lambda name: readings(summary(name)),
         "trainings": lambda name: trainings(summary(name)),
         "errors": lambda name, *which: errors(summary(name), *which),
+        "saving": lambda metric: saving(evidence.measured("recorded-active"), metric),
         "solved": solved,
         "identified": lambda: identified(evidence.identifications()),
         "bench": lambda case: bench(evidence.benchmark(case)),

@@ -14,6 +14,7 @@ from jaxtyping import Float, Int
 
 from sainet.datasets.splits import last_known, split_rows
 from sainet.datasets.store import Store
+from sainet.evaluation.intervals import RESAMPLES, Estimate
 from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import (
     Header,
@@ -145,6 +146,48 @@ def _measured(
     whole = join(parts)
     folds = np.full(whole.data.sizes["sample"], number, np.int32)
     return Measurements(whole.data.assign_coords(fold=("sample", folds)), whole.header)
+
+
+def pushes_for_the_last(measured: Measurements, metric: str) -> Estimate:
+    """Return how many chosen pushes have the error of the most pushes at random.
+
+    The error of chosen pushes is interpolated between their counts. The interval is a
+    bootstrap over draws; beyond the last count it ends there.
+    """
+    counts = [float(c.factors["training_pushes"]) for c in measured.header.conditions]
+    place, draw = (measured.data[name].values for name in ("condition", "fold"))
+    at_random, chosen = (
+        np.array(
+            [
+                [
+                    measured.values(metric, name)
+                    .reshape(-1)[(place == number) & (draw == one)]
+                    .mean()
+                    for one in np.unique(draw)
+                ]
+                for number in range(len(counts))
+            ]
+        )
+        for name in (RANDOM.slug, CHOSEN.slug)
+    )
+
+    def needed(draws: Int[np.ndarray, " draw"]) -> float:
+        target = at_random[-1, draws].mean()
+        falling = np.minimum.accumulate(chosen[:, draws].mean(axis=1))
+        return float(np.interp(-target, -falling, counts))
+
+    drawn = np.random.default_rng(_STREAM).integers(
+        at_random.shape[1], size=(RESAMPLES, at_random.shape[1])
+    )
+    low, high = np.percentile([needed(each) for each in drawn], (2.5, 97.5))
+    whole = needed(np.arange(at_random.shape[1]))
+    return Estimate(whole, float(low), float(high))
+
+
+def saving(measured: Measurements, metric: str) -> str:
+    """Return `pushes_for_the_last` in words."""
+    found = pushes_for_the_last(measured, metric)
+    return f"{found.value:.0f} [{found.low:.0f}, {found.high:.0f}]"
 
 
 def _plan(scope: Scope) -> Plan:
