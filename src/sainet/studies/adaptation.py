@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from sainet.control.config import ControlConfig
 from sainet.evaluation.measurements import Condition
-from sainet.studies.paper_setup import SAIN, physics
+from sainet.studies.paper_setup import physics
 from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Join, Load
 from sainet.studies.study import Plan, Scope, Study
@@ -17,14 +17,10 @@ from sainet.studies.study import Plan, Scope, Study
 TRIALS = {"quick": 4, "paper": 100}
 WRONG = 0.1  # fraction of each mass and radius
 NOMINAL, TRUE = physics()
-_SAIN = Load(SAIN, "sain")
 
 
 def _plan(scope: Scope) -> Plan:
-    """Return the trials of each kind of properties, without and with adaptation.
-
-    SAIN, whose decisions take longer, has half as many, and wrong properties only.
-    """
+    """Return the trials of each kind of properties, without and with adaptation."""
     return Plan(Join(tuple(_trials(TRIALS[scope.scale]))))
 
 
@@ -39,11 +35,6 @@ def _trials(count: int) -> Iterator[RunTrials]:
         yield _condition(label, config, model)
         if config != usual:
             yield _condition(f"{label}, adapted", replace(config, adapt=True), model)
-    few = replace(usual, trials=max(count // 2, 1))
-    wrong = replace(few, property_error=WRONG)
-    yield _condition(f"SAIN, wrong by {WRONG:.0%}", wrong, _SAIN)
-    adapted = replace(wrong, adapt=True)
-    yield _condition(f"SAIN, wrong by {WRONG:.0%}, adapted", adapted, _SAIN)
 
 
 def _condition(label: str, config: ControlConfig, model: Load) -> RunTrials:
