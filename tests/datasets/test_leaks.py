@@ -114,3 +114,19 @@ def test_a_process_is_refused_on_its_pushes_in_any_dataset(
         assert f"trained on 5 of these {pushes} pushes" in capfd.readouterr().err
     assert run([*words, str(parts / "test")]) == 0
     assert open_store(parts / "test").info.pushes == 2
+
+
+def test_an_identified_engine_is_refused_on_its_own_pushes(
+    whole, tmp_path: Path, capsys
+):
+    known = write_split(open_store(whole.path), tmp_path / "parts", test=0.25)
+    out = tmp_path / "identified"
+    store = ["--data", str(known[0].path), "--quiet"]
+    assert run(["identify", *store, "--out", str(out)]) == 0
+    capsys.readouterr()
+    assert run(["evaluate", "--model", str(out), "--data", str(whole.path)]) == 2
+    error = capsys.readouterr().err
+    assert f"{out}/identified.json: the engine was identified on 6 of these 8" in error
+    words = ["evaluate", "--model", str(out), "--data", str(known[1].path)]
+    assert run(words) == 0
+    assert run(["evaluate", "--model", str(out), *store, "--force"]) == 0

@@ -52,8 +52,8 @@ def evaluate(
         every = ", ".join(names)
         raise BadInput(f"`model`: {every} are not all different; rename one.")
     info = store.info
-    trained = any(model.card is not None for model in models)
-    hashes = store.push_hashes() if trained and not force else None
+    fitted = any(model.card or model.identified for model in models)
+    hashes = store.push_hashes() if fitted and not force else None
     for model in () if force else models:
         model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
     pushes = _Pushes(store, _limit(store, steps))

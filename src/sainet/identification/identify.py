@@ -35,6 +35,7 @@ from sainet.identification.residuals import (
     slopes,
 )
 from sainet.models.card import IDENTIFIED, Estimate, Identified, read_identified
+from sainet.runs.digests import digests_to_text
 from sainet.runs.documents import write_document
 from sainet.runs.errors import BadInput, BadStore
 from sainet.runs.folders import open_run
@@ -182,6 +183,7 @@ def identify(
         after_mm=after[0],
         before_deg=before[1],
         after_deg=after[1],
+        digests=digests_to_text(store.push_hashes()),
     )
 
 

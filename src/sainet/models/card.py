@@ -56,6 +56,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
 
     file: ClassVar[str] = CARD
     noun: ClassVar[str] = "network"
+    made: ClassVar[str] = "trained"
 
     identity: ModelId
     kind: Literal["robot", "direct-force"]  # setup of the pushes
@@ -117,7 +118,7 @@ def read_card(folder: Path) -> Card:
     return read_document(path, Card, error=BadCheckpoint, remedy="train it again")
 
 
-_INTERNAL = ("engine", "format_version")
+_INTERNAL = ("digests", "engine", "format_version")
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -134,6 +135,10 @@ class Estimate(msgspec.Struct, frozen=True):
 class Identified(msgspec.Struct, frozen=True, kw_only=True):
     """Parameters estimated from pushes, and how much they improve the engine."""
 
+    file: ClassVar[str] = IDENTIFIED
+    noun: ClassVar[str] = "engine"
+    made: ClassVar[str] = "identified"
+
     engine: InternalEngine  # with the estimated parameters
     estimates: tuple[Estimate, ...]
     pushes: int
@@ -141,6 +146,7 @@ class Identified(msgspec.Struct, frozen=True, kw_only=True):
     after_mm: Size
     before_deg: Size  # mean rotation error
     after_deg: Size
+    digests: str = ""  # of the pushes (`runs.digests`); empty: of an earlier version
     format_version: Literal[2] = 2
 
     def to_json(self) -> dict[str, object]:

@@ -128,6 +128,7 @@ class Model:
             pushes: hashes of the test pushes (`Store.push_hashes`); None: unknown.
         """
         if self.card is None:
+            self._check_unseen(pushes)
             return
         path = f"{self.folder}/{self.card.file}" if self.folder else self.name
         if self.card.kind != kind:
@@ -146,10 +147,19 @@ class Model:
                 "have been trained on these very pushes. Generate others with another "
                 "`seed`, or give `force`."
             )
-        seen = 0 if pushes is None else pushes_overlap(self.card.pushes, pushes)
-        if pushes is not None and seen:
+        self._check_unseen(pushes)
+
+    def _check_unseen(self, pushes: UInt64[np.ndarray, " push"] | None) -> None:
+        """Raise `BadCheckpoint` if the model was fitted to some of these pushes."""
+        source = self.card or self.identified
+        if source is None or pushes is None:
+            return
+        known = source.digests if isinstance(source, Identified) else source.pushes
+        seen = pushes_overlap(known, pushes)
+        path = f"{self.folder}/{source.file}" if self.folder else self.name
+        if seen:
             raise BadCheckpoint(
-                f"{path}: the {self.card.noun} was trained on {seen} of these "
+                f"{path}: the {source.noun} was {source.made} on {seen} of these "
                 f"{len(pushes)} pushes. Test it on others ('sainet split'), or give "
                 "`force`."
             )

@@ -50,6 +50,7 @@ class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
 
     file: ClassVar[str] = PROCESS
     noun: ClassVar[str] = "Gaussian process"
+    made: ClassVar[str] = "trained"
 
     identity: ModelId
     kind: Literal["robot"]

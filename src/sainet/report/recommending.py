@@ -70,4 +70,4 @@ def _less(difference: Estimate) -> str:
         for number in (difference.value, difference.high, difference.low)
     )
     interval = "" if low is None else f" [{low:.2f}, {high:.2f}]"
-    return f"{value:.2f}{interval}"
+    return f"{value:.2f}{interval}".replace("-", "−")  # noqa: RUF001
