@@ -268,6 +268,7 @@ CONNECTIONS = {
     "adaptation": 25,
     "units and bad pushes of tables": 35,
     "expected costs in planners": 40,
+    "cross-validation": 10,
     "ensembles": 62,
     "provenance of identified engines": 10,
 }

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +14,7 @@ from sainet.api.pushes import Dataset, store_of
 from sainet.api.table import ErrorTable
 from sainet.datasets.folds import Scheme
 from sainet.evaluation.recommendation import Recommendation
+from sainet.report.table import Table
 from sainet.runs.errors import require, require_one_of
 from sainet.studies.cross_validation import CandidateName, candidates_named
 from sainet.studies.runner import Progress, Runner
@@ -36,6 +38,11 @@ class CrossValidation(ErrorTable):
     def recommendation(self) -> Recommendation:
         """The model to use, and how much less it errs, with 95 % intervals."""
         return self.found.recommendation
+
+    @cached_property
+    def content(self) -> Table:
+        """The cells of the table, comparisons and the verdict."""
+        return self.found.table
 
     def verdict(self) -> str:
         """Return the recommended model and what it gains, in words."""

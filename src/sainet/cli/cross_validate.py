@@ -58,7 +58,6 @@ class CrossValidate:
         require(self.folds > 1, "folds", "at least 2", self.folds)
         use_devices()
         from sainet.datasets.store import open_store
-        from sainet.report.arrange import arrange
         from sainet.report.writers import print_table, write_table
         from sainet.studies.cross_validation import candidates_named
         from sainet.studies.runner import Runner
@@ -73,12 +72,12 @@ class CrossValidate:
             runner = Runner(self.out / STEPS, pool, bars)
             found = cross_validate(store, self.by, self.folds, models, runner)
         page = found.write(self.out, self.data)
-        print_table(arrange(found.summary), self.output.console)
-        for sentence in (*found.coverage, "", found.verdict):
-            self.output.console.print(sentence, markup=False, soft_wrap=True)
+        for sentence in found.coverage:
+            self.output.say(sentence)
+        print_table(found.table, self.output.console)
         self.output.say(f"\nNext: {self._command(found.recommended)}\nPage: {page}")
         if self.table is not None:
-            write_table(arrange(found.summary), self.table)
+            write_table(found.table, self.table)
         return {**found.to_json(), "page": str(page)}
 
     def _command(self, model: "ModelId") -> str:

@@ -22,7 +22,7 @@ def verdict(
         folds: conditions, each a division into folds.
     """
     labels = labels_of(summary.models)
-    named = " and ".join(f"`{label}`" for label in folds)
+    named = " and ".join(folds)
     name, engines = labels[found.model], order[:2]
     if found.model == order[0]:
         opening = "Neither identification nor learning is worth it here: no model errs "

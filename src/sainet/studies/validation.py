@@ -1,7 +1,7 @@
 """Is learning worth it on some pushes? A cross-validation, its verdict and its page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,8 +15,10 @@ from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.recommendation import Recommendation, recommend
 from sainet.evaluation.summary import BASELINE, Summary, summarise
 from sainet.models.identity import ModelId
+from sainet.report.arrange import arrange
 from sainet.report.pages.page import REPORT, Report, write_report
 from sainet.report.recommending import verdict
+from sainet.report.table import Table
 from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
     Candidate,
@@ -63,6 +65,11 @@ class Validation:
         return verdict(self.recommendation, self.summary, self.order, self.folds)
 
     @property
+    def table(self) -> Table:
+        """The table of errors, with the verdict below it."""
+        return replace(arrange(self.summary), verdicts=(self.verdict,))
+
+    @property
     def coverage(self) -> list[str]:
         """Whether the regions of Gaussian processes hold, a sentence for each."""
         found = coverage_of(self.measured)
@@ -83,7 +90,8 @@ class Validation:
         page = Report(
             title="Is learning worth it on these pushes?",
             subtitle=str(data),
-            summary="\n\n".join([self.verdict, *self.coverage]),
+            conclusion=self.verdict,
+            summary="\n\n".join(self.coverage),
             table=self.summary,
         )
         return write_report(page, out / REPORT)

@@ -16,6 +16,7 @@ from sainet.report.arrange import arrange
 from sainet.report.episode_frames import Replay, Track, episode_data, numbers, plane
 from sainet.report.pages import read, render
 from sainet.report.palette import css_variables, styles_of
+from sainet.report.table import Table
 from sainet.report.writers import to_html
 from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadInput
@@ -57,6 +58,7 @@ class Report:
     title: str
     subtitle: str = ""
     summary: str = ""  # plain text, paragraphs parted by empty lines
+    conclusion: str = ""  # at the top; empty: the first verdict on the table
     table: Summary | None = None
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
@@ -82,7 +84,7 @@ def to_page(report: Report) -> str:
         paragraphs=[text for text in re.split(r"\n\s*\n", report.summary) if text],
         replays=[replay_data(replay) for replay in report.replays],
         episodes=[episode_data(record) for record in report.episodes],
-        conclusions=table.verdicts[:_CONCLUSIONS] if table else (),
+        conclusions=_conclusions(report, table),
         table=Markup(to_html(table)) if table else "",
         is_of_trials=report.table is not None and report.table.is_of_trials,
         figures=list(_pictures(report.figures)),
@@ -92,6 +94,12 @@ def to_page(report: Report) -> str:
         css=Markup(read("report.css")),
         script=Markup('"use strict";\n' + "\n".join(map(read, _SCRIPTS))),
     )
+
+
+def _conclusions(report: Report, table: Table | None) -> Sequence[str]:
+    if report.conclusion:
+        return (report.conclusion,)
+    return table.verdicts[:_CONCLUSIONS] if table else ()
 
 
 def replay_data(replay: Replay) -> dict[str, object]:
