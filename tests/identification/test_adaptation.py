@@ -1,4 +1,4 @@
-"""Adaptation finds what pushes can tell, keeps the rest, and follows a change."""
+"""Adaptation corrects what affects pushes, keeps the rest, and follows a change."""
 
 from dataclasses import replace
 
@@ -70,7 +70,7 @@ def test_wrong_radii_are_corrected_by_few_pushes(radius):
     assert (np.asarray(left) < 0.25 * np.asarray(before)).all()
 
 
-def test_what_pushes_cannot_tell_stays_as_given():
+def test_properties_without_effect_stay_as_given():
     """In slow pushing only the ratio of masses has an effect, not their size."""
     given = wrong(TRUE, mass=(1.1, 1.1))
     _, found = after(given, [TRUE] * 6)
@@ -79,7 +79,7 @@ def test_what_pushes_cannot_tell_stays_as_given():
     assert found.mass[1] / found.mass[0] == pytest.approx(1.0 / 0.9, rel=0.02)
 
 
-def test_a_ratio_of_masses_is_told_slowly():
+def test_a_ratio_of_masses_is_corrected_slowly():
     given = wrong(TRUE, mass=(0.9, 1.1))
     _, found = after(given, [TRUE] * REMEMBERED)
     ratios = [float(s.mass[1] / s.mass[0]) for s in (TRUE, found, given)]
@@ -130,7 +130,7 @@ def test_a_network_stays_as_it_is_and_is_given_other_properties():
     assert np.allclose(found.radius, TRUE.radius, rtol=0.03)
 
 
-def test_troubled_pushes_tell_nothing():
+def test_pushes_with_trouble_are_left_out():
     adaptation = Adaptation(load_model("physics-true"), wrong(TRUE, radius=(0.9, 1.0)))
     adaptation.add(recording_of(TRUE, 0.1, 0.2, trouble="disk 1 did not move"))
     adaptation.adapted(TRUE.in_a_row())

@@ -1,4 +1,4 @@
-"""The next pushes: where the process knows least, not where it was fitted."""
+"""The next pushes: where predictions are least certain, not where pushes are."""
 
 import json
 

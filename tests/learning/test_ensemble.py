@@ -129,7 +129,7 @@ def test_an_identical_call_changes_nothing(folder, store):
 
 def test_edited_ensembles_are_refused(folder, tmp_path):
     for name, value, message in (
-        ("members", ["0" * 64] * MEMBERS, "members.0. is another hash"),
+        ("members", ["0" * 64] * MEMBERS, "members.0. is not the hash"),
         ("reach", [[1.0, 1.0]], "differ in their numbers"),
         ("floor", [[0.0, 1.0]] * 2, "floor"),
     ):

@@ -1,9 +1,9 @@
 """Adaptation: properties of disks estimated from the pushes of an episode.
 
 The estimate is the most probable one, given the pushes so far and a normal prior about
-the given properties, on the logarithms. What slow pushing cannot tell apart stays as it
-was given: the mass of disk 1 and the friction of the table, of which only the ratios to
-other masses and frictions have an effect. Gauss-Newton steps minimise the prediction
+the given properties, on the logarithms. Properties that slow pushing cannot separate
+stay as they were given: the mass of disk 1 and the friction of the table. Only their
+ratios to other masses and frictions have an effect. Gauss-Newton steps minimise the prediction
 errors of the planar engine, as in `identify`.
 """
 
@@ -145,10 +145,11 @@ class Adaptation:
             self._pushes.append(push)
 
     def adapted(self, state: State) -> tuple[AbstractDynamics, Scene]:
-        """Return the model and the scene with what the pushes so far have told.
+        """Return model and scene with the properties estimated from the pushes so far.
 
         Args:
-            state: observed; disks that overlap in it are too large.
+            state: observed before the next push. Where two disks overlap in it, the
+                estimated radii are reduced.
         """
         pushes = self._remembered()
         self.found = _most_probable(self.found, self._given, pushes, _poses(state))

@@ -28,7 +28,7 @@ from sainet.scenes.geometry import rotate
 
 CALIBRATION = 0.2  # share of the pushes that no member is trained on
 _FEWEST = 10  # of these pushes: the quantile of fewer is their maximum
-_LEAST = 0.01  # of the variance of errors, that of a floor
+_LEAST = 0.01  # smallest variance of a floor, as a fraction of that of the errors
 _TINY = 1e-9  # m and rad
 _BATCH = 256  # pushes at a time
 

@@ -19,7 +19,8 @@ from sainet.scenes.state import State, Trajectory
 class Calibration(eqx.Module):
     """What makes 90 % regions of the disagreement of networks, for each body."""
 
-    # Of position (m) and rotation (rad): what the spread of the networks lacks.
+    # Deviation of position (m) and rotation (rad) that is added to the spread of the
+    # networks, so that both together are as large as the errors.
     floor: Float[Array, "body 2"]
     # Factors of deviations, and sizes of regions that are the same for all pushes.
     reach: Float[Array, "body 2"]
@@ -35,7 +36,7 @@ class Spread(eqx.Module):
 
 
 class Ensemble(AbstractDynamics):
-    """Predicts the mean of several networks, each of which goes on by itself."""
+    """Predicts the mean of several networks; each continues from its own states."""
 
     networks: InteractionNetwork  # its arrays have an axis, member, first
     engine: AbstractEngine | None

@@ -82,7 +82,7 @@ def load_ensemble(folder: Path) -> tuple[InteractionNetwork, Card, EnsembleCard]
     ):
         if card.weights != weights:
             raise BadCheckpoint(
-                f"{path}: members[{number}] is another hash than that of "
+                f"{path}: members[{number}] is not the hash of the weights in "
                 f"{member(folder, number)}; train the ensemble again."
             )
     card = loaded[0][1]

@@ -157,7 +157,7 @@ class ResidualProcess(AbstractCorrector):
 
     @property
     def has_regions(self) -> bool:
-        """True: a process knows how sure it is."""
+        """True: a process predicts its own variance."""
         return True
 
     def correct(
