@@ -162,7 +162,7 @@ def test_the_command_trains_an_ensemble_that_plans(store, tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["model"] == "in"
     model = load_model(str(tmp_path / "out"))
     assert model.dynamics.has_regions
-    assert "ensemble" in model.id.label or model.name == "out"
+    assert model.card.identity.label.endswith("ensemble")
 
 
 def test_other_numbers_of_disks_have_no_regions(folder):

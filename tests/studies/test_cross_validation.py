@@ -22,7 +22,7 @@ from sainet.studies.cross_validation import (
     cross_validated,
 )
 
-PUSHES, FOLDS = 48, 2
+PUSHES, FOLDS = 64, 2
 MODELS = ("physics", "physics-identified", "gp-identified-angle")
 
 
@@ -113,9 +113,9 @@ def test_an_identical_command_fits_nothing_again(printed, command, capsys):
     ("options", "message"),
     [
         (["--folds", "1"], "folds.*at least 2"),
-        (["--folds", "13"], "24 pushes, 12 to divide by kind, do not fill 13 folds"),
+        (["--folds", "17"], "32 pushes, 16 to divide by kind, do not fill 17 folds"),
         (["--group", "glass"], "no group 'glass'"),
-        (["--pushes", "99"], "24 pushes, not 99"),
+        (["--pushes", "99"], "32 pushes, not 99"),
         (["--table", "errors.doc"], "table.*\\.md"),
     ],
 )
@@ -144,3 +144,10 @@ def test_a_script_gives_the_same_verdict(recorded, command, printed):
 def test_candidates_come_from_the_simplest():
     found = candidates_named(["gp-place", "gp-angle"])
     assert found == (ProcessCandidate("angle"), ProcessCandidate("place"))
+
+
+def test_pushes_that_a_candidate_cannot_be_fitted_to_are_refused_at_once(tmp_path):
+    info = info_of(PUSHES, engine="recorded", seed=None, bodies=3)
+    store = write(tmp_path / "three", info, end_points_alone(made_up(info)))
+    with pytest.raises(BadStore, match="3 disks.*train a network"):
+        cross_validated(store, ("kind",), FOLDS, candidates_named(["gp-angle"]))

@@ -57,13 +57,13 @@ def test_orders_begin_alike_and_are_tested_on_other_kinds(
 
 
 def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
-    monkeypatch.setattr(recorded_few, "COUNTS", {"quick": (6, 10)})
+    monkeypatch.setattr(recorded_few, "COUNTS", {"quick": (10, 12)})
     study = load_study("recorded-few")
     parts = study.plan(Scope("quick", recorded)).measured.parts
     fewer, more = (
         [set(step.engine.pushes.store.rows) for step in part.parts] for part in parts
     )
-    assert [len(rows) for rows in fewer] == [6, 6]
+    assert [len(rows) for rows in fewer] == [10, 10]
     assert all(one < other for one, other in zip(fewer, more, strict=True))
     tests = [set(step.pushes.store.rows) for step in parts[0].parts]
     assert not any(rows & held for rows, held in zip(more, tests, strict=True))

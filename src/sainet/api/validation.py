@@ -12,17 +12,16 @@ from typing import get_args
 from sainet.api.progress import shown_progress
 from sainet.api.pushes import Dataset, store_of
 from sainet.api.table import ErrorTable
-from sainet.datasets.folds import Scheme
+from sainet.datasets import Scheme
 from sainet.evaluation.recommendation import Recommendation
 from sainet.report.table import Table
 from sainet.runs.errors import require, require_one_of
-from sainet.studies.cross_validation import CandidateName, candidates_named
+from sainet.studies import USUAL_CANDIDATES, CandidateName
+from sainet.studies.cross_validation import candidates_named
 from sainet.studies.runner import Progress, Runner
 from sainet.studies.study import STEPS
 from sainet.studies.validation import Validation
 from sainet.studies.validation import cross_validate as validate
-
-USUAL: tuple[CandidateName, ...] = ("sain", "gp-side", "sain-place", "gp-place")
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,7 +53,7 @@ def cross_validate(
     *,
     by: Scheme | Sequence[Scheme] = "chain",
     folds: int = 5,
-    models: Sequence[CandidateName] = USUAL,
+    models: Sequence[CandidateName] = USUAL_CANDIDATES,
     out: PathLike[str] | str | None = None,
     progress: bool | None = None,
 ) -> CrossValidation:

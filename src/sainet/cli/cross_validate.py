@@ -2,18 +2,18 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Bars, Json, Output
+from sainet.datasets import Scheme
 from sainet.report import WRITERS
 from sainet.runs.errors import require, require_one_of
 from sainet.runs.workers import worker_pool
+from sainet.studies import USUAL_CANDIDATES, CandidateName
 
 if TYPE_CHECKING:
     from sainet.models.identity import ModelId
-
-Scheme = Literal["kind", "chain", "place", "direction", "side", "order"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,9 +37,7 @@ class CrossValidate:
     (of recording): test pushes lie in a part that training pushes left out."""
     folds: int = 5
     """Number of folds."""
-    models: tuple[
-        Literal["gp-angle", "sain", "gp-side", "sain-place", "gp-place"], ...
-    ] = ("sain", "gp-side", "sain-place", "gp-place")
+    models: tuple[CandidateName, ...] = USUAL_CANDIDATES
     """Learned models beside the engine as it is and the identified engine: Gaussian
     processes (gp) and networks (sain). side: for pushes of one disk only. place: also
     at one place of one table."""
@@ -57,16 +55,14 @@ class CrossValidate:
             require_one_of("table", self.table.suffix, WRITERS)
         require(self.folds > 1, "folds", "at least 2", self.folds)
         use_devices()
-        from sainet.datasets.store import open_store
+        from sainet.datasets.store import open_part
         from sainet.report.writers import print_table, write_table
         from sainet.studies.cross_validation import candidates_named
         from sainet.studies.runner import Runner
         from sainet.studies.study import STEPS
         from sainet.studies.validation import cross_validate
 
-        store = open_store(self.data)
-        store = store if self.group is None else store.of_group(self.group)
-        store = store if self.pushes is None else store.first(self.pushes)
+        store = open_part(self.data, self.group, self.pushes)
         models = candidates_named(self.models)
         with worker_pool(None, core_each=True) as pool, Bars(self.output) as bars:
             runner = Runner(self.out / STEPS, pool, bars)

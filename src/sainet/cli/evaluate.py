@@ -43,7 +43,7 @@ class Evaluate:
         if self.table is not None:
             require_one_of("table", self.table.suffix, WRITERS)
         use_devices(self.devices)
-        from sainet.datasets.store import open_store
+        from sainet.datasets.store import open_part
         from sainet.evaluation.as_json import to_json_object
         from sainet.evaluation.coverage import coverage_of, in_words, to_json
         from sainet.evaluation.evaluate import evaluate
@@ -52,8 +52,7 @@ class Evaluate:
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table, write_table
 
-        store = open_store(self.data)
-        store = store if self.group is None else store.of_group(self.group)
+        store = open_part(self.data, self.group)
         names = self.model or self._fitting(store)
         models = [
             load_model(name, engine=self.engine, force=self.force) for name in names

@@ -22,12 +22,11 @@ class Identify:
     def run(self) -> Json:
         """Identify the parameters and print those that are not identifiable."""
         use_devices(None)
-        from sainet.datasets.store import open_store
+        from sainet.datasets.store import open_part
         from sainet.identification.identify import identify_into
         from sainet.report.writers import print_estimates
 
-        store = open_store(self.data)
-        store = store if self.group is None else store.of_group(self.group)
+        store = open_part(self.data, self.group)
         title = f"Fitting to {store.info.pushes} pushes"
         with progress_bar(title, None, self.output) as advance:
             found = identify_into(

@@ -50,15 +50,13 @@ class ProcessJob:
             BadSetting: one is a setting of networks.
         """
         use_devices(None)
-        from sainet.datasets.store import open_store
+        from sainet.datasets.store import open_part
         from sainet.learning.process import fit_process, fits_of
         from sainet.models.library import find_internal_engine
         from sainet.models.process_card import read_process_card
 
         settings = _settings(changes, usual)
-        store = open_store(self.data)
-        store = store if self.group is None else store.of_group(self.group)
-        store = store if self.pushes is None else store.first(self.pushes)
+        store = open_part(self.data, self.group, self.pushes)
 
         def identify(folder: Path) -> "InternalEngine":
             from sainet.identification.identify import identify_into

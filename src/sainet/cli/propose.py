@@ -30,12 +30,14 @@ class Propose:
         """Choose the pushes and print them."""
         require(self.count > 0, "count", "at least 1", self.count)
         use_cache()
+        from msgspec import to_builtins
         from rich import box
         from rich.table import Table
 
         from sainet.learning.choosing import propose
 
-        found = propose(self.model, self.count, self.pool)
+        proposals = propose(self.model, self.count, self.pool)
+        found: list[dict[str, float]] = to_builtins(proposals)
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         for heading in found[0]:
             table.add_column(heading.replace("_", " "), justify="right")

@@ -96,14 +96,12 @@ class Job:
             The JSON object of the command.
         """
         use_devices(devices)
-        from sainet.datasets.store import open_store
+        from sainet.datasets.store import open_part
         from sainet.learning.fit import fit
         from sainet.learning.log import reported
         from sainet.report.figures.curves import draw_history
 
-        store = open_store(self.data)
-        store = store if self.group is None else store.of_group(self.group)
-        store = store if self.pushes is None else store.first(self.pushes)
+        store = open_part(self.data, self.group, self.pushes)
         name, total = self.model.upper(), recipe.optimiser.iterations
         if self.members is not None:
             return self._ensemble(store, recipe, output)

@@ -6,17 +6,17 @@ sides of the disk or of the time of recording, so that a model must extrapolate.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Literal, get_args
+from typing import get_args
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from sainet.datasets import Scheme
 from sainet.datasets.schema import Arrays
 from sainet.datasets.splits import fold_of_push, linked
 from sainet.datasets.store import Store
 from sainet.runs.errors import BadStore
 
-Scheme = Literal["kind", "chain", "place", "direction", "side", "order"]
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 BLOCKED: tuple[Scheme, ...] = ("place", "direction", "side", "order")
 

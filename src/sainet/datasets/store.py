@@ -169,6 +169,23 @@ def _hash_pushes(
     return hashes
 
 
+def open_part(path: Path, group: str | None, pushes: int | None = None) -> Store:
+    """Return a dataset with the pushes of one group, and the first of these only.
+
+    Args:
+        path: see `open_store`.
+        group: name of the group; None: all groups.
+        pushes: number of pushes; None: all.
+
+    Raises:
+        BadStore: see `open_store`.
+        BadInput: there is no such group, or it has fewer pushes.
+    """
+    store = open_store(path)
+    store = store if group is None else store.of_group(group)
+    return store if pushes is None else store.first(pushes)
+
+
 def open_store(path: Path | str, *, verify: bool = True) -> Store:
     """Return a dataset after checking that nothing is missing or changed.
 

@@ -3,8 +3,8 @@
 The estimate is the most probable one, given the pushes so far and a normal prior about
 the given properties, on the logarithms. Properties that slow pushing cannot separate
 stay as they were given: the mass of disk 1 and the friction of the table. Only their
-ratios to other masses and frictions have an effect. Gauss-Newton steps minimise the prediction
-errors of the planar engine, as in `identify`.
+ratios to other masses and frictions have an effect. Gauss-Newton steps minimise the
+prediction errors of the planar engine, as in `identify`.
 """
 
 from collections import deque

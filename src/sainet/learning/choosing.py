@@ -8,6 +8,7 @@ that its expected reduction over all possible pushes is known before a push is m
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import cho_solve, cholesky
@@ -77,29 +78,61 @@ def _mean_variance(known: list[Float[np.ndarray, "push push"]]) -> float:
     return float(np.mean([np.diag(each) for each in known]))
 
 
+class Proposal(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A push to record next: a row of a pool, or a push of one disk."""
+
+    row: int | None = None  # of the pool
+    # Place of the disk on the table; None: the process does not depend on it.
+    x_mm: float | None = None
+    y_mm: float | None = None
+    # Angle of the disk and contact normal, both on the table; None as above.
+    disk_angle_deg: float | None = None
+    contact_normal_deg: float | None = None
+    direction_deg: float | None = None  # of the push, from the normal
+    variance_left_percent: float  # after this push and those before it
+
+
 @dataclass(frozen=True)
-class Proposal:
+class _Push:
     """A push of one disk that could be made."""
 
     x: float  # m, of the disk on the table
     y: float  # m
     angle: float  # rad, of the disk
-    contact_angle: float  # rad, of the contact normal on the table
+    normal: float  # rad, of the contact on the table
     direction: float  # rad, of the push from the normal
 
-    def in_words(self) -> dict[str, float]:
-        """Return the push in mm and degrees."""
-        angles = (self.angle, self.contact_angle, self.direction)
-        degrees = (round(float(np.rad2deg(each)), 1) for each in angles)
-        names = ("disk_angle_deg", "contact_normal_deg", "direction_deg")
-        place = {"x_mm": round(1000 * self.x, 1), "y_mm": round(1000 * self.y, 1)}
-        return {**place, **dict(zip(names, degrees, strict=True))}
+    def inputs(self, card: ProcessCard, fitted: Fitted) -> list[float]:
+        """Return the inputs of the push, with the mean mass and radius."""
+        known = {"contact_angle": self.direction, "place_x": self.x, "place_y": self.y}
+        for name, angle in (
+            ("normal_on_disk", self.normal - self.angle),
+            ("normal_on_table", self.normal),
+            ("disk_on_table", self.angle),
+        ):
+            known |= {f"{name}_x": np.cos(angle), f"{name}_y": np.sin(angle)}
+        means = dict(zip(card.inputs, fitted.centre.tolist(), strict=True))
+        return [float({**means, **known}[name]) for name in card.inputs]
+
+    def proposed(self, card: ProcessCard, left: float) -> Proposal:
+        """Return the push without what the process does not depend on."""
+        degrees = np.rad2deg([self.angle, self.normal, self.direction])
+        angle, normal, direction = degrees.round(1).tolist()
+        has_place, has_side = (
+            name in card.inputs for name in ("place_x", "normal_on_disk_x")
+        )
+        return Proposal(
+            x_mm=round(1000 * self.x, 1) if has_place else None,
+            y_mm=round(1000 * self.y, 1) if has_place else None,
+            disk_angle_deg=angle if has_side else None,
+            contact_normal_deg=normal if has_side else None,
+            direction_deg=direction,
+            variance_left_percent=left,
+        )
 
 
-def possible_pushes(
-    fitted: Fitted, card: ProcessCard
-) -> tuple[list[Proposal], Float[np.ndarray, "push input"]]:
-    """Return pushes of one disk all over what the process was fitted to, and inputs.
+def _possible_pushes(fitted: Fitted, card: ProcessCard) -> list[_Push]:
+    """Return pushes of one disk all over what the process was fitted to.
 
     Raises:
         BadInput: the process is of two disks, whose arrangements no grid covers.
@@ -111,29 +144,26 @@ def possible_pushes(
         )
     seen = fitted.inputs * fitted.width + fitted.centre
     ranges = {
-        name: (c.min(), c.max()) for name, c in zip(card.inputs, seen.T, strict=True)
+        name: (values.min(), values.max())
+        for name, values in zip(card.inputs, seen.T, strict=True)
     }
     draw = np.random.default_rng(_SEED).random((GRID, 5))
     turn = 2 * np.pi * (draw[:, :2] - 0.5)
+    names = ("place_x", "place_y", "contact_angle")
     x, y, direction = (
         low + (high - low) * share
         for (low, high), share in zip(
-            (
-                ranges.get(name, (0.0, 0.0))
-                for name in ("place_x", "place_y", "contact_angle")
-            ),
+            (ranges.get(name, (0.0, 0.0)) for name in names),
             draw[:, 2:].T,
             strict=True,
         )
     )
-    pushes = [
-        Proposal(*map(float, row)) for row in zip(x, y, *turn.T, direction, strict=True)
-    ]
-    return pushes, np.array([_inputs(each, card, fitted) for each in pushes])
+    columns = (x, y, *turn.T, direction)
+    return [_Push(*map(float, row)) for row in zip(*columns, strict=True)]
 
 
-def propose(folder: Path, count: int, pool: Path | None) -> list[dict[str, float]]:
-    """Return the next pushes to record, and the variance that each leaves.
+def propose(folder: Path, count: int, pool: Path | None) -> list[Proposal]:
+    """Return the next pushes to record, in order.
 
     Args:
         folder: of the process.
@@ -141,40 +171,25 @@ def propose(folder: Path, count: int, pool: Path | None) -> list[dict[str, float
         pool: dataset of possible pushes; None: pushes of one disk all over the range of
             those that the process was fitted to.
 
-    Returns:
-        For each push in order: its row in the pool; without one the place of the disk
-        (mm), its angle, that of the contact normal on the table and that of the push
-        from it (degrees); then the variance that is left (percent of that now).
-
     Raises:
-        BadCheckpoint: the folder holds no process that can be used.
-        BadInput: fewer pushes are possible, or the pool lacks an input.
+        BadCheckpoint: the folder contains no process that can be used.
+        BadStore: the pool cannot be used.
+        BadInput: fewer pushes are possible, or a process of two disks has no pool.
     """
     fitted, card = read_process(folder)
+    pushes = _possible_pushes(fitted, card) if pool is None else []
     if pool is None:
-        pushes, inputs = possible_pushes(fitted, card)
-        rows = [each.in_words() for each in pushes]
+        inputs = np.array([push.inputs(card, fitted) for push in pushes])
     else:
         inputs = inputs_of(open_store(pool), card.inputs, card.disks, card.camera)
-        rows = [{"row": row} for row in range(len(inputs))]
-    if count > len(rows):
-        raise BadInput(f"`count` is {count}; only {len(rows)} pushes are possible.")
-    chosen, left = choose_pushes(fitted, inputs, count)
+    if count > len(inputs):
+        raise BadInput(f"`count` is {count}; only {len(inputs)} pushes are possible.")
+    rows, left = choose_pushes(fitted, inputs, count)
     return [
-        {**rows[row], "variance_left_percent": round(100 * share, 1)}
-        for row, share in zip(chosen.tolist(), left.tolist(), strict=True)
+        pushes[row].proposed(card, share)
+        if pushes
+        else Proposal(row=row, variance_left_percent=share)
+        for row, share in zip(
+            rows.tolist(), (100 * left).round(1).tolist(), strict=True
+        )
     ]
-
-
-def _inputs(push: Proposal, card: ProcessCard, fitted: Fitted) -> list[float]:
-    """Return the inputs of a push, with the mean mass and radius."""
-    side = push.contact_angle - push.angle
-    known = {"contact_angle": push.direction, "place_x": push.x, "place_y": push.y}
-    for name, angle in (
-        ("normal_on_disk", side),
-        ("normal_on_table", push.contact_angle),
-        ("disk_on_table", push.angle),
-    ):
-        known |= {f"{name}_x": np.cos(angle), f"{name}_y": np.sin(angle)}
-    means = dict(zip(card.inputs, fitted.centre.tolist(), strict=True))
-    return [float({**means, **known}[name]) for name in card.inputs]

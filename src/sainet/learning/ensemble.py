@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,7 +18,7 @@ from sainet.learning.log import read_log
 from sainet.learning.process import quantile
 from sainet.learning.recipes import Recipe, SingleSteps
 from sainet.models.ensemble import Ensemble
-from sainet.models.ensemble_card import ENSEMBLE, MEMBERS, EnsembleCard, member
+from sainet.models.ensemble_card import ENSEMBLE, MEMBERS, EnsembleCard, Pair, member
 from sainet.models.identity import ModelKind
 from sainet.models.library import load_members
 from sainet.runs.digests import digests_to_text
@@ -25,6 +26,7 @@ from sainet.runs.documents import write_document
 from sainet.runs.errors import BadSetting, BadStore
 from sainet.runs.folders import open_run
 from sainet.scenes.geometry import rotate
+from sainet.scenes.recording import CameraOffset
 
 CALIBRATION = 0.2  # share of the pushes that no member is trained on
 _FEWEST = 10  # of these pushes: the quantile of fewer is their maximum
@@ -95,21 +97,38 @@ def fit_ensemble(
     losses = [log[-1].loss for log in logs if log]
     loss = float(np.mean(losses)) if losses else None
     if not folder.is_finished:
-        found = _calibrated(out, members, store.take(np.sort(held)))
-        pushes = digests_to_text(store.push_hashes())
-        card = msgspec.structs.replace(found, pushes=pushes, final_loss=loss)
+        dynamics, cards = load_members(out, members)
+        calibrated = _calibrate(dynamics, cards[0].camera, store.take(np.sort(held)))
+        card = EnsembleCard(
+            members=tuple(each.weights for each in cards),
+            pushes=digests_to_text(store.push_hashes()),
+            final_loss=loss,
+            **calibrated._asdict(),
+        )
         write_document(out / ENSEMBLE, card)
     return loss
 
 
-def _calibrated(out: Path, members: int, held: Store) -> EnsembleCard:
-    """Return the card of finished members, calibrated on pushes that none saw."""
-    dynamics, cards = load_members(out, members)
+class _Calibrated(NamedTuple):
+    """Fields of an `EnsembleCard`."""
+
+    floor: tuple[Pair, ...]
+    reach: tuple[Pair, ...]
+    plain: tuple[Pair, ...]
+    calibrated_on: int
+
+
+def _calibrate(dynamics: Ensemble, camera: CameraOffset, held: Store) -> _Calibrated:
+    """Calibrate members on pushes that none of them was trained on.
+
+    Raises:
+        BadStore: too few of their ends were observed.
+    """
     parts = []
     for start in range(0, held.info.pushes, _BATCH):
         rows = range(start, min(start + _BATCH, held.info.pushes))
         arrays = held.take(rows).read(slice(None))
-        batch = to_batch(arrays, held.info).seen_by(cards[0].camera)
+        batch = to_batch(arrays, held.info).seen_by(camera)
         parts.append(_missed_and_spread(dynamics, batch))
     missed, spread = (np.concatenate(each) for each in zip(*parts, strict=True))
     known = np.isfinite(missed).all(axis=(1, 2))
@@ -133,13 +152,11 @@ def _calibrated(out: Path, members: int, held: Store) -> EnsembleCard:
     def listed(values: np.ndarray) -> tuple[tuple[float, float], ...]:
         return tuple((float(one), float(other)) for one, other in values)
 
-    return EnsembleCard(
-        members=tuple(card.weights for card in cards),
+    return _Calibrated(
         floor=listed(floor),
         reach=listed(quantile(sizes(scaled))),
         plain=listed(quantile(sizes(missed))),
         calibrated_on=len(missed),
-        pushes="",
     )
 
 

@@ -64,6 +64,12 @@ def inputs_of(
     return np.stack([np.asarray(found[name], np.float64) for name in names], axis=1)
 
 
+def check_inputs(store: Store, features: ProcessFeatures) -> None:
+    """Raise `BadInput` if inputs that are asked for are the same in all pushes."""
+    found = _inputs(to_batch(store.read(slice(None)), store.info))
+    _varying({name: np.asarray(value) for name, value in found.items()}, features)
+
+
 def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -> Ends:
     """Return inputs and residuals of all pushes whose ends were observed.
 

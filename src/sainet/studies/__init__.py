@@ -9,6 +9,11 @@ if TYPE_CHECKING:
     from sainet.studies.study import Study
 
 Scale = Literal["quick", "paper"]
+# Learned models that a cross-validation compares, see `studies.cross_validation`.
+CandidateName = Literal["gp-angle", "gp-side", "gp-place", "sain", "sain-place"]
+USUAL_CANDIDATES: tuple[CandidateName, ...] = (
+    *("sain", "gp-side", "sain-place", "gp-place"),
+)
 
 
 STUDIES = {

@@ -10,21 +10,23 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, get_args
 
 import jax
 from msgspec import structs
 
-from sainet.datasets.folds import Scheme, folds_by
+from sainet.datasets import Scheme
+from sainet.datasets.folds import folds_by
 from sainet.datasets.splits import folds_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import Condition, Measurements, read_measurements
+from sainet.identification.identify import check_store as check_observed
 from sainet.identification.identify import identify_into
 from sainet.learning.fit import fit
-from sainet.learning.process import fit_process
+from sainet.learning.process import check_store, fit_process
+from sainet.learning.process_ends import check_inputs
 from sainet.learning.recipes import RESIDUAL
 from sainet.models.card import read_identified
 from sainet.models.identity import Features, ModelId, ProcessFeatures
@@ -32,6 +34,7 @@ from sainet.models.library import load_model
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.errors import unknown_name
+from sainet.studies import CandidateName
 from sainet.studies.recorded_models import IDENTIFIED, surfaces_of
 from sainet.studies.recorded_pushes import JoinFolds
 from sainet.studies.runner import Runner
@@ -76,6 +79,10 @@ class Candidate(abc.ABC):
         """The identity in tables."""
 
     @abc.abstractmethod
+    def check(self, store: Store) -> None:
+        """Raise `BadStore` or `BadInput` if the model cannot be fitted to pushes."""
+
+    @abc.abstractmethod
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Fit the model to pushes, around an engine, unless the folder has it."""
 
@@ -91,10 +98,19 @@ class ProcessCandidate(Candidate):
         """The identity in tables."""
         return ModelId(kind="gp", simulator=IDENTIFIED, features=self.features)
 
+    @property
+    def settings(self) -> ProcessSettings:
+        """How it is fitted."""
+        return ProcessSettings(features=self.features)
+
+    def check(self, store: Store) -> None:
+        """Refuse too few pushes, too many disks, and inputs that do not vary."""
+        check_store(store, self.settings)
+        check_inputs(store, self.features)
+
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Fit the process."""
-        settings = ProcessSettings(features=self.features)
-        fit_process(store, folder, internal, settings)
+        fit_process(store, folder, internal, self.settings)
 
 
 @dataclass(frozen=True)
@@ -110,6 +126,9 @@ class NetworkCandidate(Candidate):
             kind="sain", simulator=IDENTIFIED, data="residual", features=self.features
         )
 
+    def check(self, store: Store) -> None:
+        """Accept all pushes that an engine can be identified on."""
+
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Train the network."""
         batch = min(RESIDUAL.optimiser.batch_size, store.info.pushes)
@@ -117,9 +136,8 @@ class NetworkCandidate(Candidate):
         fit("sain", store, recipe, folder, assumed_engine=internal)
 
 
-CandidateName = Literal["gp-angle", "gp-side", "gp-place", "sain", "sain-place"]
 # From the simplest to the one that needs most: the same table and the same disk.
-CANDIDATES: Mapping[str, Candidate] = MappingProxyType(
+CANDIDATES: Mapping[CandidateName, Candidate] = MappingProxyType(
     {
         "gp-angle": ProcessCandidate("angle"),
         "sain": NetworkCandidate("paper"),
@@ -128,7 +146,6 @@ CANDIDATES: Mapping[str, Candidate] = MappingProxyType(
         "gp-place": ProcessCandidate("place"),
     }
 )
-NAMES: tuple[CandidateName, ...] = get_args(CandidateName)
 
 
 def candidates_named(names: Sequence[str]) -> tuple[Candidate, ...]:
@@ -219,7 +236,15 @@ class WithUnions(Step[Measurements]):
 def fitted_and_tested(
     training: Store, tests: Store, condition: Condition, models: Sequence[Candidate]
 ) -> EvaluateFitted:
-    """Return the step that fits the engine and models to pushes and tests them."""
+    """Return the step that fits the engine and models to pushes and tests them.
+
+    Raises:
+        BadStore: something cannot be fitted to these pushes.
+        BadInput: the inputs of a model are the same in all of them.
+    """
+    check_observed(training)
+    for each in models:
+        each.check(training)
     engine = FitEngine(Given(training))
     fitted = tuple(FitCandidate(engine, each) for each in models)
     return EvaluateFitted(engine, fitted, Given(tests), condition)
@@ -237,7 +262,8 @@ def cross_validated(
         models: to fit, beside the engine.
 
     Raises:
-        BadStore: the pushes do not suffice for so many folds.
+        BadStore: the pushes do not suffice for so many folds, or for a model.
+        BadInput: the inputs of a model are the same in all pushes.
     """
     surfaces = surfaces_of(store)
     parts: list[Step[Measurements]] = []

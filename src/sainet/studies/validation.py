@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from sainet.datasets.folds import Scheme
+from sainet.datasets import Scheme
 from sainet.datasets.store import Store
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.coverage import coverage_of, in_words, to_json
