@@ -30,7 +30,8 @@ from sainet.learning.loss import (
 )
 from sainet.learning.recipes import PAPER, Recipe
 from sainet.learning.step import FitState, even_batch, first_state, make_step
-from sainet.models.correctors.interaction import FEATURE_BOUND, InteractionNetwork
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import FEATURE_BOUND, AbstractNetwork
 from sainet.models.features import feature_set
 from sainet.models.inputs import drives, motion_to_frame, push_frame, still_features
 from sainet.models.integrators import GRADIENT_BOUND, GRADIENT_SIZES
@@ -252,7 +253,7 @@ def bench_training(
 
 
 def counted_gflop(
-    network: InteractionNetwork, pushes: int, steps: int, bodies: int
+    network: AbstractNetwork, pushes: int, steps: int, bodies: int
 ) -> float:
     """Return the operations in the matrix products of an iteration (1e9).
 

@@ -32,6 +32,8 @@ def check_task(task: Task) -> None:
         _check_existing(task, task.existing)
     if task.has_single_steps:
         _check_single_steps(task)
+    if task.recipe.features == "contact":
+        _check_contacts(task)
 
 
 def _check_simulator(task: Task) -> None:
@@ -65,8 +67,11 @@ def _check_existing(task: Task, existing: Existing) -> None:
                 "`start` another network."
             )
     _check_internal_engine(task, existing)
-    if card.identity.features == "place" and not task.features.has_place:
-        raise BadCheckpoint(f"{path}: features is 'place'; give `features` place, too.")
+    given, wanted = card.identity.features, task.recipe.features
+    if given != wanted and (given, wanted) != ("paper", "place"):
+        raise BadCheckpoint(
+            f"{path}: features is {given!r}; give `features` {given}, too."
+        )
 
 
 def _check_internal_engine(task: Task, existing: Existing) -> None:
@@ -105,4 +110,18 @@ def _check_single_steps(task: Task) -> None:
         raise BadInput(
             f"`assumed_engine` is {task.inner.simulator.slug}, which cannot restart at "
             "every step of a training; use planar, or train on whole pushes."
+        )
+
+
+def _check_contacts(task: Task) -> None:
+    info, path = task.store.info, task.store.path
+    if info.kind != "robot":
+        raise BadStore(
+            f"{path}: kind is {info.kind!r}; the features 'contact' need the path of "
+            "the pusher, give pushes of the robot setup."
+        )
+    if task.inner is None or not (task.is_additive or task.existing):
+        raise BadInput(
+            "`features` is contact: such a network adds to an engine; use 'sainet "
+            f"tune sain --start {FROM_ENGINE}'."
         )

@@ -29,7 +29,7 @@ from sainet.learning.step import (
 from sainet.learning.task import Existing, Task, begin, settings
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
-from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.identity import ModelId, ModelKind, TrainingData
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
@@ -42,7 +42,7 @@ from sainet.runs.manifest import MANIFEST, Manifest, manifest
 from sainet.scenes.recording import AGREES
 
 STATE = "state.safetensors"
-Validate = Callable[[InteractionNetwork], float]
+Validate = Callable[[AbstractNetwork], float]
 Step = Callable[[FitState, PushBatch], tuple[FitState, Array]]
 _log = logging.getLogger(__name__)
 
@@ -157,7 +157,7 @@ class Progress:
     history: list[LogLine]
 
     @property
-    def network(self) -> InteractionNetwork:
+    def network(self) -> AbstractNetwork:
         """The network with which training would end now."""
         network = self.state.result
         return network if self.best is None else self.best.put_into(network)

@@ -9,8 +9,8 @@ from jaxtyping import Array, Bool, Float
 
 from sainet.datasets.batch import PushBatch
 from sainet.learning.recipes import Objective
-from sainet.models.correctors.interaction import Scales
-from sainet.models.features import FeatureSet
+from sainet.models.correctors.network import Scales
+from sainet.models.features import AbstractFeatures, Signs
 from sainet.models.inputs import (
     Drive,
     Moment,
@@ -118,6 +118,9 @@ def path_to_frame(
     return jax.vmap(motion_to_frame, in_axes=(1, None))(motion, frame)
 
 
+Columns = Callable[[Moment], Array]
+Weights = Callable[[Moment], Array | None]
+
 # A deviation below this, or this share of the mean, is rounding: nothing varies.
 _CONSTANT, _CONSTANT_SHARE = 1e-9, 1e-4
 _STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is rounding
@@ -126,7 +129,7 @@ _STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is roun
 @eqx.filter_jit
 def feature_scales(
     batch: PushBatch,
-    features: FeatureSet,
+    features: AbstractFeatures,
     integrator: Integrator = Acceleration(),  # noqa: B008
 ) -> Scales:
     """Return means and deviations of a network's inputs along the true paths.
@@ -146,15 +149,20 @@ def feature_scales(
     still = in_columns(still_features(batch.scene, frame))
     columns = jax.vmap(in_columns)((before, drive))
 
-    def spread(inputs: Callable[[Moment], Array]) -> tuple[Array, Array]:
-        def at(now: tuple[Array, Drive]) -> Array:
-            return inputs(Moment(now[0], still, now[1]))
+    def spread(inputs: Columns, weights: Weights, signs: Signs) -> tuple[Array, Array]:
+        def at(now: tuple[Array, Drive]) -> tuple[Array, Array | None]:
+            moment = Moment(now[0], still, now[1])
+            return inputs(moment), weights(moment)
 
-        return _spread(jax.vmap(at, out_axes=1)(columns))
+        return _spread(*jax.vmap(at, out_axes=(1, 0))(columns), signs)
 
-    body_mean, body_deviation = spread(features.of_bodies)
+    body_mean, body_deviation = spread(
+        features.of_bodies, features.body_weights, features.body_signs
+    )
     if batch.scene.body_count > 1:
-        pair_mean, pair_deviation = spread(features.of_pairs)
+        pair_mean, pair_deviation = spread(
+            features.of_pairs, features.pair_weights, features.pair_signs
+        )
     else:
         size = features.pair_size
         pair_mean, pair_deviation = jnp.zeros(size), jnp.ones(size)
@@ -172,9 +180,20 @@ def feature_scales(
     )
 
 
-def _spread(features: Array) -> tuple[Array, Array]:
+def _spread(
+    features: Array, weights: Array | None, signs: Signs
+) -> tuple[Array, Array]:
+    """Return means and deviations, over mirrored pushes too where there are signs."""
     rows = features.reshape(features.shape[0], -1)
-    mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
+    if weights is None:
+        mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
+    else:
+        shares = weights.reshape(-1) / jnp.maximum(jnp.sum(weights), _CONSTANT)
+        mean = jnp.sum(rows * shares, axis=1)
+        if signs:
+            mean = jnp.where(jnp.array(signs) < 0, 0.0, mean)
+        spread = (rows - mean[:, None]) ** 2
+        deviation = jnp.sqrt(jnp.sum(spread * shares, axis=1))
     # A feature that never varies must not be divided by rounding errors.
     varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
     return mean, jnp.where(varies, deviation, 1.0)

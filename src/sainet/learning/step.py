@@ -18,7 +18,7 @@ from sainet.engines.devices import BATCH, batch_mesh
 from sainet.learning.held import predict_batch
 from sainet.learning.loss import LossWeights, push_losses, to_target
 from sainet.learning.recipes import Optimiser, Recipe
-from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import AbstractNetwork
 
 _MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
 _MICROBATCH = 500  # pushes at a time: 20,000 single steps would leave the cache
@@ -29,13 +29,13 @@ Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
 class FitState(eqx.Module):
     """Everything that changes while training: enough to resume, bit for bit."""
 
-    network: InteractionNetwork
+    network: AbstractNetwork
     optimizer: Any
     iteration: Array
     average: Trained | None = None  # of the layers, if the recipe averages
 
     @property
-    def result(self) -> InteractionNetwork:
+    def result(self) -> AbstractNetwork:
         """The network with which training would end now."""
         if self.average is None:
             return self.network
@@ -53,17 +53,17 @@ def make_optimizer(optimiser: Optimiser) -> optax.GradientTransformation:
     return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
 
 
-def trained_layers(network: InteractionNetwork) -> Trained:
+def trained_layers(network: AbstractNetwork) -> Trained:
     """Return the part of a network that is trained: all except its scales."""
     return network.rel, network.dyn
 
 
-def with_layers(network: InteractionNetwork, layers: Trained) -> InteractionNetwork:
+def with_layers(network: AbstractNetwork, layers: Trained) -> AbstractNetwork:
     """Return the network with other weights."""
     return eqx.tree_at(trained_layers, network, layers)
 
 
-def first_state(network: InteractionNetwork, optimiser: Optimiser) -> FitState:
+def first_state(network: AbstractNetwork, optimiser: Optimiser) -> FitState:
     """Return the state before the first iteration."""
     layers = trained_layers(network)
     moments = make_optimizer(optimiser).init(layers)
@@ -82,7 +82,7 @@ def _averaged(average: Trained, layers: Trained, span: int, done: Array) -> Trai
 
 
 def data_loss(
-    network: InteractionNetwork, batch: PushBatch, weights: LossWeights, hold: int = 1
+    network: AbstractNetwork, batch: PushBatch, weights: LossWeights, hold: int = 1
 ) -> Array:
     """Return the sum of the losses of the pushes of a batch (see `predict_batch`)."""
     predicted = predict_batch(network, batch, hold)
@@ -91,7 +91,7 @@ def data_loss(
 
 def make_gradient(
     weights: LossWeights, hold: int = 1
-) -> Callable[[InteractionNetwork, PushBatch], tuple[Array, Trained]]:
+) -> Callable[[AbstractNetwork, PushBatch], tuple[Array, Trained]]:
     """Return a function that sums loss and gradient over a batch on all devices.
 
     The sums of the devices are added outside of the compiled function. XLA's all-reduce
@@ -106,9 +106,7 @@ def make_gradient(
     parts = NamedSharding(batch_mesh(), PartitionSpec(BATCH))
     weights = jax.device_put(weights, everywhere)
 
-    def gradient(
-        network: InteractionNetwork, batch: PushBatch
-    ) -> tuple[Array, Trained]:
+    def gradient(network: AbstractNetwork, batch: PushBatch) -> tuple[Array, Trained]:
         numbers, to_network = ravel_pytree(network)
         numbers = jax.device_put(numbers, everywhere)
         batch = jax.device_put(jax.device_get(batch), parts)
@@ -127,7 +125,7 @@ def _sum_on_devices(
     numbers: Array,
     batch: PushBatch,
     *,
-    to_network: Callable[[Array], InteractionNetwork],
+    to_network: Callable[[Array], AbstractNetwork],
     hold: int,
 ) -> tuple[Array, Array]:
     """Return losses ``[part]`` and gradients ``[part number]`` of all devices."""
@@ -148,7 +146,7 @@ def _sum_on_devices(
 
 
 def _sum_of_part(
-    weights: LossWeights, network: InteractionNetwork, batch: PushBatch, hold: int
+    weights: LossWeights, network: AbstractNetwork, batch: PushBatch, hold: int
 ) -> tuple[Array, Array]:
     """Return losses ``[part]`` and gradients ``[part number]`` of a device."""
 
@@ -252,12 +250,12 @@ class Best(eqx.Module):
     iteration: Int[Array, ""]
 
     @staticmethod
-    def first(network: InteractionNetwork, loss: float) -> "Best":
+    def first(network: AbstractNetwork, loss: float) -> "Best":
         """Return the network that training begins with: it may remain the best."""
         return Best(trained_layers(network), jnp.float32(loss), jnp.int32(0))
 
     def or_better(
-        self, network: InteractionNetwork, loss: float, iteration: int
+        self, network: AbstractNetwork, loss: float, iteration: int
     ) -> "Best":
         """Return the better one of this and another network."""
         if not loss < float(self.loss):
@@ -268,6 +266,6 @@ class Best(eqx.Module):
         """Return whether nothing has become better for so many iterations."""
         return 0 < patience <= iteration - int(self.iteration)
 
-    def put_into(self, network: InteractionNetwork) -> InteractionNetwork:
+    def put_into(self, network: AbstractNetwork) -> AbstractNetwork:
         """Return the network with the best layers."""
         return with_layers(network, self.layers)

@@ -19,9 +19,10 @@ from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import FROM_ENGINE, FromSimulator, Recipe, SingleSteps
 from sainet.learning.step import FitState, first_state
 from sainet.models.card import Card
-from sainet.models.checkpoint import untrained
-from sainet.models.correctors.interaction import InteractionNetwork, Scales
-from sainet.models.features import FeatureSet, Place, feature_set
+from sainet.models.checkpoint import features_of, new_network, untrained
+from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import AbstractNetwork, Scales
+from sainet.models.features import AbstractFeatures, FeatureSet, Place
 from sainet.models.identity import ModelKind
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 
@@ -33,7 +34,7 @@ _REPORTING = ("log_every", "checkpoint_every")  # settings that do not affect we
 class Existing:
     """The network from which training starts."""
 
-    network: InteractionNetwork
+    network: AbstractNetwork
     card: Card
     folder: Path
 
@@ -78,12 +79,14 @@ class Task:
         return Prediction(self.assumed, self.store.info)
 
     @property
-    def features(self) -> FeatureSet:
+    def features(self) -> AbstractFeatures:
         """The inputs of the network."""
-        return feature_set(
-            self.store.info.kind,
+        info = self.store.info
+        return features_of(
+            self.recipe.features,
+            info.kind,
             simulator=self.model == "sain",
-            place=self.recipe.features == "place",
+            time_step=info.time_step,
         )
 
     @property
@@ -172,16 +175,19 @@ def begin(task: Task) -> tuple[FitState, LossWeights]:
     return state, loss_weights(sample, task.recipe.objective)
 
 
-def _first_network(task: Task, scales: Scales) -> InteractionNetwork:
+def _first_network(task: Task, scales: Scales) -> AbstractNetwork:
     if task.existing is None:
-        return InteractionNetwork(
+        return new_network(
             task.features,
-            time_step=task.store.info.time_step,
+            task.store.info.time_step,
+            task.integrator,
             key=jax.random.key(task.recipe.seed),
             scales=scales,
-            integrator=task.integrator,
+            hold=task.recipe.horizon.hold,
         )
     network = task.existing.network
+    if not isinstance(network, InteractionNetwork):
+        return network
     return widen(network, scales) if task.features != network.features else network
 
 
@@ -209,8 +215,10 @@ def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:
         lambda s: (s.body_mean, s.body_deviation), kept, (mean, deviation)
     )
     features = FeatureSet((*network.features.blocks, Place()))
+    wide = untrained(features, network.time_step, network.integrator)
+    assert isinstance(wide, InteractionNetwork)
     return eqx.tree_at(
         lambda n: (n.rel, n.dyn, n.scales),
-        untrained(features, network.time_step, network.integrator),
+        wide,
         (network.rel, dyn, widened),
     )

@@ -6,11 +6,16 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import msgspec
 import numpy as np
+from jaxtyping import PRNGKeyArray
 
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
+from sainet.models.contacts import ContactFeatures
+from sainet.models.correctors.contact import HOLD, ContactNetwork
 from sainet.models.correctors.interaction import InteractionNetwork
-from sainet.models.features import FeatureSet, feature_set
+from sainet.models.correctors.network import AbstractNetwork, Scales
+from sainet.models.features import AbstractFeatures, FeatureSet, feature_set
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.runs.documents import content_hash, read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
@@ -73,19 +78,24 @@ def _take(path: Path, found: dict[str, np.ndarray], where: Any, like: Any) -> An
     return jnp.asarray(array)
 
 
-def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
+def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
     """Read a trained network and its card.
 
     Raises:
         BadCheckpoint: missing, damaged, of a newer format, or the two do not fit.
     """
     card = read_card(folder)
-    augmented = card.identity.kind == "sain"
-    place = card.identity.features == "place"
-    features = feature_set(card.kind, simulator=augmented, place=place)
     additive = card.integrator == "relaxing-residual"
     integrator = RelaxingResidual() if additive else Acceleration()
-    network = untrained(features, card.time_step, integrator)
+    features = features_of(
+        card.identity.features,
+        card.kind,
+        simulator=card.identity.kind == "sain",
+        time_step=card.time_step,
+    )
+    hold = card.recipe.hold
+    hold = HOLD if hold is msgspec.UNSET else hold
+    network = untrained(features, card.time_step, integrator, hold)
     loaded = load_arrays(folder / WEIGHTS, network)
     if content_hash(read_file(folder / WEIGHTS, error=BadCheckpoint)) != card.weights:
         raise BadCheckpoint(
@@ -95,14 +105,59 @@ def load_network(folder: Path) -> tuple[InteractionNetwork, Card]:
     return loaded, card
 
 
+def features_of(
+    name: str, setup: str, *, simulator: bool, time_step: float
+) -> AbstractFeatures:
+    """Return the inputs of a network.
+
+    Args:
+        name: of the features.
+        setup: whose controls the network takes, `robot` or `direct-force`.
+        simulator: whether the network takes the simulator prediction (SAIN).
+        time_step: s.
+    """
+    if name == "contact":
+        return ContactFeatures(time_step)
+    return feature_set(setup, simulator=simulator, place=name == "place")
+
+
+def new_network(
+    features: AbstractFeatures,
+    time_step: float,
+    integrator: Integrator,
+    *,
+    key: PRNGKeyArray,
+    scales: Scales | None = None,
+    hold: int = HOLD,
+) -> AbstractNetwork:
+    """Return an untrained network of the form that fits its features.
+
+    Args:
+        features: its inputs.
+        time_step: s, of the pushes that it is for.
+        integrator: of its accelerations.
+        key: draws the weights.
+        scales: of its inputs and outputs; None is 1.
+        hold: steps over which a contact network is held.
+    """
+    if isinstance(features, ContactFeatures):
+        return ContactNetwork(features, key=key, scales=scales, hold=hold)
+    assert isinstance(features, FeatureSet)
+    return InteractionNetwork(
+        features, time_step=time_step, key=key, scales=scales, integrator=integrator
+    )
+
+
 def untrained(
-    features: FeatureSet, time_step: float, integrator: Integrator
-) -> InteractionNetwork:
+    features: AbstractFeatures,
+    time_step: float,
+    integrator: Integrator,
+    hold: int = HOLD,
+) -> AbstractNetwork:
     """Return a network of shapes instead of arrays: drawing arrays takes seconds."""
 
-    def make() -> InteractionNetwork:
-        return InteractionNetwork(
-            features, time_step=time_step, key=jax.random.key(0), integrator=integrator
-        )
+    def make() -> AbstractNetwork:
+        key = jax.random.key(0)
+        return new_network(features, time_step, integrator, key=key, hold=hold)
 
     return eqx.filter_eval_shape(make)

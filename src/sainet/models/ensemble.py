@@ -7,7 +7,7 @@ from jaxtyping import Array, Float
 
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors import Purpose, Region, Start
-from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.dynamics import AbstractDynamics, Given
 from sainet.models.inputs import push_frame
 from sainet.scenes.controls import Controls
@@ -38,7 +38,7 @@ class Spread(eqx.Module):
 class Ensemble(AbstractDynamics):
     """Predicts the mean of several networks; each continues from its own states."""
 
-    networks: InteractionNetwork  # its arrays have an axis, member, first
+    networks: AbstractNetwork  # its arrays have an axis, member, first
     engine: AbstractEngine | None
     calibration: Calibration | None = None
 
@@ -79,7 +79,7 @@ class Ensemble(AbstractDynamics):
             assert carry.simulated is not None
             simulated = self.engine.rollout(scene, carry.simulated, controls)
 
-        def correct(network: InteractionNetwork, predicted: State) -> Trajectory:
+        def correct(network: AbstractNetwork, predicted: State) -> Trajectory:
             start = Start(predicted, carry.frame, carry.simulated, carry.first)
             return network.correct(scene, start, controls, simulated).trajectory
 
@@ -124,7 +124,7 @@ def deviations(
     return place, jnp.sqrt(found.turn**2 + floor[None, :, 1] ** 2)
 
 
-def stacked(networks: list[InteractionNetwork]) -> InteractionNetwork:
+def stacked(networks: list[AbstractNetwork]) -> AbstractNetwork:
     """Return networks of one form as one, whose arrays have an axis, member, first."""
     arrays = [eqx.partition(each, eqx.is_array) for each in networks]
     joined = jax.tree.map(lambda *x: jnp.stack(x), *(each for each, _ in arrays))

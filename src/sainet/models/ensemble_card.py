@@ -8,7 +8,7 @@ import msgspec
 
 from sainet.models.card import Card
 from sainet.models.checkpoint import load_network
-from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.ensemble import Calibration, stacked
 from sainet.runs.documents import read_document
 from sainet.runs.errors import BadCheckpoint
@@ -66,7 +66,7 @@ def member(folder: Path, number: int) -> Path:
     return folder / f"member-{number}"
 
 
-def load_ensemble(folder: Path) -> tuple[InteractionNetwork, Card, EnsembleCard]:
+def load_ensemble(folder: Path) -> tuple[AbstractNetwork, Card, EnsembleCard]:
     """Read the members, stacked, their common card, and the card of the ensemble.
 
     Raises:

@@ -5,6 +5,7 @@ prediction) and what goes beyond them. The order of the blocks is the layout of 
 first layer's weights.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,9 +13,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from sainet.models.inputs import Moment
-
-FEATURES = ("paper", "place")
+from sainet.models.inputs import Moment, given
 
 
 @dataclass(frozen=True)
@@ -65,11 +64,11 @@ class SimulatedStep(Block):
     def of_pairs(self, moment: Moment, shift: int) -> Sequence[Array]:
         """Return the step of the simulated velocity and spin."""
         del shift
-        return (_given(moment.drive.simulated_rate_step),)
+        return (given(moment.drive.simulated_rate_step),)
 
     def of_bodies(self, moment: Moment) -> Sequence[Array]:
         """Return the step of the simulated pose."""
-        return (_given(moment.drive.simulated_pose_step),)
+        return (given(moment.drive.simulated_pose_step),)
 
 
 class RelativeMotion(Block):
@@ -90,7 +89,7 @@ class PathAction(Block):
 
     def of_bodies(self, moment: Moment) -> Sequence[Array]:
         """Return commanded velocity, offset of the pusher (m) and gap (m)."""
-        still, pusher = moment.still, _given(moment.drive.pusher)
+        still, pusher = moment.still, given(moment.drive.pusher)
         offset = pusher[:, None] - moment.motion[0:2]
         distance = jnp.sqrt(jnp.sum(offset**2, axis=0) + 1e-12)
         gap = distance - still.radius - still.pusher_radius[None]
@@ -153,12 +152,6 @@ class Place(Block):
         return (jnp.stack(numbers),)
 
 
-def _given(x: Array | None) -> Array:
-    if x is None:
-        raise ValueError("the network takes inputs that the controls or engine lack")
-    return x
-
-
 def _for_all(moment: Moment) -> Array:
     """Return the action of each push, repeated for every body."""
     action = moment.drive.action
@@ -169,8 +162,59 @@ def _for_all(moment: Moment) -> Array:
 ACTIONS: dict[str, Block] = {"robot": PathAction(), "direct-force": ForceAction()}
 
 
+Signs = tuple[int, ...]
+
+
+class AbstractFeatures(ABC):
+    """The inputs of a network."""
+
+    pair_signs: ClassVar[Signs] = ()  # of mirrored inputs; none without symmetry
+    body_signs: ClassVar[Signs] = ()
+
+    @property
+    @abstractmethod
+    def kind(self) -> str:
+        """The setup whose controls the network takes."""
+
+    @property
+    @abstractmethod
+    def has_simulator(self) -> bool:
+        """Whether the network takes the simulator prediction."""
+
+    @property
+    @abstractmethod
+    def has_place(self) -> bool:
+        """Whether the network takes the place on the table."""
+
+    @property
+    @abstractmethod
+    def pair_size(self) -> int:
+        """Inputs of f_rel."""
+
+    @property
+    @abstractmethod
+    def body_size(self) -> int:
+        """Inputs of f_dyn that are not the summed effects."""
+
+    @abstractmethod
+    def of_pairs(self, moment: Moment) -> Float[Array, "feature other body push"]:
+        """Return the inputs of f_rel: entry k pairs each body i with body i + k + 1."""
+
+    @abstractmethod
+    def of_bodies(self, moment: Moment) -> Float[Array, "feature body push"]:
+        """Return the inputs of f_dyn except the effects."""
+
+    def pair_weights(self, moment: Moment) -> Float[Array, "other body push"] | None:
+        """Return how much each pair counts in statistics; None is equally."""
+        del moment
+
+    def body_weights(self, moment: Moment) -> Float[Array, "body push"] | None:
+        """Return how much each body counts in statistics; None is equally."""
+        del moment
+
+
 @dataclass(frozen=True)
-class FeatureSet:
+class FeatureSet(AbstractFeatures):
     """The inputs of a network: blocks in the order of its weights."""
 
     blocks: tuple[Block, ...]

@@ -12,7 +12,8 @@ Kind = Literal["physics", "in", "sain", "gp", "published"]
 # pushes; "residual" an additive network and "real" a new one, recorded pushes only.
 TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
 ModelKind = Literal["in", "sain"]  # of networks
-Features = Literal["paper", "place"]
+# "contact" is the form of contact networks, beyond the paper.
+Features = Literal["paper", "place", "contact"]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
 Variant = Literal["", "bystander", "single-steps", "for-all", "ensemble"]
 

@@ -96,6 +96,13 @@ class Moment(NamedTuple):
         return self.motion.shape[1], self.motion.shape[2]
 
 
+def given(x: Array | None) -> Array:
+    """Return an input of a network, or raise an error where it is missing."""
+    if x is None:
+        raise ValueError("the network takes inputs that the controls or engine lack")
+    return x
+
+
 def in_columns(tree: Any) -> Any:  # noqa: ANN401
     """Reverse the axes of every array: push, body, number become number, body, push."""
     return jax.tree.map(jnp.transpose, tree)

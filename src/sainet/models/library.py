@@ -26,7 +26,7 @@ from sainet.models.card import (
     read_identified,
 )
 from sainet.models.checkpoint import load_network
-from sainet.models.correctors.interaction import InteractionNetwork
+from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.dynamics import (
     AbstractDynamics,
     LearnedDynamics,
@@ -122,7 +122,7 @@ def load_model(
         internal, built = InternalEngine(simulator, card.camera), simulator.build()
         dynamics = SimulatorAugmented(network, built)
     if calibration is not None:
-        assert isinstance(network, InteractionNetwork)
+        assert isinstance(network, AbstractNetwork)
         dynamics = Ensemble(network, built, calibration)
     if card.has_single_steps:
         dynamics, internal = _restarted(folder, dynamics), None

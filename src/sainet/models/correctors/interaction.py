@@ -4,87 +4,30 @@ One class is both IN and SAIN; SAIN's features include the simulator prediction 
 to 7 and 8 to 12 of the paper).
 """
 
-from collections.abc import Callable
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jax import lax
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from sainet.models import integrators
-from sainet.models.correctors import AbstractCorrector, Prediction, Purpose, Start
-from sainet.models.features import FeatureSet
-from sainet.models.inputs import (
-    Drive,
-    Moment,
-    Still,
-    drives,
-    in_columns,
-    motion_from_frame,
-    motion_to_frame,
-    near_pairs,
-    still_features,
+from sainet.models.correctors.network import (
+    AbstractNetwork,
+    Layers,
+    Scales,
+    like,
+    silenced,
+    standardise,
+    unit_scales,
 )
-from sainet.scenes.controls import Controls
-from sainet.scenes.scene import Scene
-from sainet.scenes.state import Trajectory, pack_motion, unpack_motion
+from sainet.models.features import FeatureSet
+from sainet.models.inputs import Moment, near_pairs
 
 WIDTHS = (128, 64, 32, 16)
 EFFECT = WIDTHS[-1]
-FEATURE_BOUND = 4.0  # standard deviations
 REACH = 0.02  # m, see `_effects`
-_CHECKPOINTED_STEPS = 2  # of the scan's body: recomputing beats reading from memory
 
 
-class Layers(eqx.Module):
-    """Linear layers with ReLU after all but the last."""
-
-    weights: tuple[Float[Array, "input output"], ...]
-    biases: tuple[Float[Array, " output"], ...]
-
-    def __init__(self, widths: tuple[int, ...], *, key: PRNGKeyArray) -> None:
-        """Draw weights uniformly within one over the root of the inputs."""
-        keys = jax.random.split(key, (len(widths) - 1, 2))
-        weights, biases = [], []
-        for (inputs, outputs), (weight_key, bias_key) in zip(
-            zip(widths[:-1], widths[1:], strict=True), keys, strict=True
-        ):
-            reach = inputs**-0.5
-            draw = jax.random.uniform
-            shape = (inputs, outputs)
-            weights.append(draw(weight_key, shape, minval=-reach, maxval=reach))
-            biases.append(draw(bias_key, (outputs,), minval=-reach, maxval=reach))
-        self.weights, self.biases = tuple(weights), tuple(biases)
-
-    def __call__(self, x: Float[Array, "input *row"]) -> Float[Array, "output *row"]:
-        """Apply the layers to each column."""
-        last, shape = len(self.weights) - 1, x.shape[1:]
-        x = x.reshape(x.shape[0], -1)
-        for index, (weight, bias) in enumerate(
-            zip(self.weights, self.biases, strict=True)
-        ):
-            x = weight.T @ x + _like(bias, x)
-            x = x if index == last else jax.nn.relu(x)
-        return x.reshape(-1, *shape)
-
-
-def _like(numbers: Float[Array, " number"], x: Array) -> Array:
-    """Return one number a row of x, to be broadcast over its columns."""
-    return numbers.reshape(-1, *(1,) * (x.ndim - 1))
-
-
-class Scales(eqx.Module):
-    """Statistics of the training data; kept with the network, never trained."""
-
-    pair_mean: Float[Array, " pair"]
-    pair_deviation: Float[Array, " pair"]
-    body_mean: Float[Array, " body"]
-    body_deviation: Float[Array, " body"]
-    acceleration: Float[Array, " 3"]  # m/s^2, m/s^2, rad/s^2
-
-
-class InteractionNetwork(AbstractCorrector):
+class InteractionNetwork(AbstractNetwork):
     """Predicts the next motion of any number of bodies."""
 
     rel: Layers  # f_rel
@@ -117,26 +60,21 @@ class InteractionNetwork(AbstractCorrector):
         self.rel = Layers((features.pair_size, *WIDTHS), key=rel_key)
         dyn = Layers((features.body_size + EFFECT, *WIDTHS, 3), key=dyn_key)
         is_additive = isinstance(integrator, integrators.RelaxingResidual)
-        self.dyn = _silenced(dyn) if is_additive else dyn
+        self.dyn = silenced(dyn) if is_additive else dyn
         self.scales = scales or unit_scales(features)
         self.features = features
         self.time_step = time_step
         self.integrator = integrator
 
-    @property
-    def made_for(self) -> Purpose:
-        """The pushes that the network is for."""
-        return Purpose(self.features.kind, self.time_step)
-
     def acceleration(self, moment: Moment) -> Float[Array, "3 body push"]:
         """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 5 and 10)."""
-        inputs = _standardise(
+        inputs = standardise(
             self.features.of_bodies(moment),
             self.scales.body_mean,
             self.scales.body_deviation,
         )
         out = self.dyn(jnp.concatenate([inputs, self._effects(moment)]))
-        return out * _like(self.scales.acceleration, out)
+        return out * like(self.scales.acceleration, out)
 
     def _effects(self, moment: Moment) -> Float[Array, "effect body push"]:
         """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j).
@@ -149,7 +87,7 @@ class InteractionNetwork(AbstractCorrector):
         others = bodies - 1
         if not others:
             return jnp.zeros((EFFECT, bodies, pushes), moment.motion.dtype)
-        inputs = _standardise(
+        inputs = standardise(
             self.features.of_pairs(moment),
             self.scales.pair_mean,
             self.scales.pair_deviation,
@@ -158,119 +96,3 @@ class InteractionNetwork(AbstractCorrector):
         if others > 1:
             effects = effects * near_pairs(moment.motion, moment.still, REACH)[None]
         return jnp.sum(effects, axis=1)
-
-    def step(
-        self, motion: Float[Array, "6 body push"], still: Still, drive: Drive
-    ) -> Float[Array, "6 body push"]:
-        """Return the next packed motion.
-
-        Args:
-            motion: of every push, in columns (see `inputs.in_columns`).
-            still: in columns.
-            drive: in columns.
-        """
-        change = self.acceleration(Moment(motion, still, drive))
-        return self.integrator.step(motion, change, drive, self.time_step)
-
-    @eqx.filter_jit
-    def correct(
-        self,
-        scene: Scene,
-        start: Start,
-        controls: Controls,
-        simulated: Trajectory | None,
-    ) -> Prediction:
-        """Predict the states after each step of the controls."""
-        path = None if simulated is None else pack_motion(simulated.states)
-        local = self.in_frame(scene, start, controls, path, unroll=unroll)
-        motion = jax.vmap(motion_from_frame, in_axes=(0, None), out_axes=1)(
-            local, start.frame
-        )
-        pusher, velocity = controls.pusher_motion(start.predicted.pusher_position)
-        return Prediction(Trajectory(unpack_motion(motion, pusher, velocity)))
-
-    def in_frame(
-        self,
-        scene: Scene,
-        start: Start,
-        controls: Controls,
-        simulated: Float[Array, "push time body 6"] | None,
-        *,
-        unroll: Callable[..., Array],
-    ) -> Float[Array, "time push body 6"]:
-        """Predict packed motion in the push frame, after each step of the controls.
-
-        Args:
-            scene: of each push.
-            start: of each push.
-            controls: in the table frame.
-            simulated: packed s-bar after each step, in the table frame; None for IN.
-            unroll: `unroll`, or the zero-order hold of training.
-        """
-        frame = start.frame
-        initial = motion_to_frame(pack_motion(start.predicted), frame)
-        before, path = initial, None
-        if simulated is not None:
-            path = jax.vmap(motion_to_frame, in_axes=(1, None), out_axes=1)(
-                simulated, frame
-            )
-        if start.simulated is not None:
-            before = motion_to_frame(pack_motion(start.simulated), frame)
-        drive = drives(controls.in_frame(frame.origin, frame.angle), before, path)
-        return (unroll)(self, initial, still_features(scene, frame), drive)
-
-
-def _silenced(layers: Layers) -> Layers:
-    """Return layers whose output is zero."""
-    last = lambda those: (those.weights[-1], those.biases[-1])  # noqa: E731
-    return eqx.tree_at(last, layers, replace_fn=jnp.zeros_like)
-
-
-def _standardise(x: Array, mean: Array, deviation: Array) -> Array:
-    """Bring features to unit size and bound them smoothly.
-
-    Contacts kick: without the bound, 200 steps of back-propagation explode.
-    """
-    scaled = (x - _like(mean, x)) / _like(deviation, x)
-    return FEATURE_BOUND * jnp.tanh(scaled / FEATURE_BOUND)
-
-
-def unit_scales(features: FeatureSet) -> Scales:
-    """Return scales that change nothing."""
-    return Scales(
-        pair_mean=jnp.zeros(features.pair_size),
-        pair_deviation=jnp.ones(features.pair_size),
-        body_mean=jnp.zeros(features.body_size),
-        body_deviation=jnp.ones(features.body_size),
-        acceleration=jnp.ones(3),
-    )
-
-
-def unroll(
-    network: InteractionNetwork,
-    initial: Float[Array, "push body 6"],
-    still: Still,
-    drive: Drive,
-) -> Float[Array, "time push body 6"]:
-    """Predict recurrently from each initial motion, all in the push frame (eq. 1).
-
-    Args:
-        network: to be applied at every step.
-        initial: packed motion at the start.
-        still: for each push.
-        drive: with axes ``[push, time, ...]``.
-
-    Returns:
-        The packed motion after each step, time first.
-    """
-    still = in_columns(still)
-
-    @jax.checkpoint
-    def body(motion: Array, now: Drive) -> tuple[Array, Array]:
-        motion = network.step(integrators.bound_gradient(motion), still, now)
-        return motion, motion
-
-    time_first = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    columns = jax.vmap(in_columns)(time_first)
-    path = lax.scan(body, in_columns(initial), columns, unroll=_CHECKPOINTED_STEPS)[1]
-    return jax.vmap(in_columns)(path)
