@@ -11,6 +11,7 @@ from sainet.learning import fit as fit_module
 from sainet.learning.fit import fit
 from sainet.learning.held import predict_batch
 from sainet.learning.loss import loss_weights, path_to_frame
+from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import (
     FINE_TUNING,
     PAPER,
@@ -19,7 +20,7 @@ from sainet.learning.recipes import (
     FromSimulator,
 )
 from sainet.learning.step import Best, trained_layers
-from sainet.learning.task import Existing, Task, begin
+from sainet.learning.task import Existing, Task
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import predict
@@ -79,7 +80,7 @@ def test_fine_tuning_starts_from_the_network_and_records_it(store, start, tmp_pa
     assert pushes_overlap(card.pushes, store.push_hashes()) == store.info.pushes
     assert (card.truth_engine, card.identity.features) == ("recorded", "paper")
     task = Task("sain", store, TUNING, PLANAR, load(start / "sain"))
-    first = begin(task)[0].network
+    first = Mixture((task,)).begin()[0].network
     for found, known in zip(
         jax.tree.leaves(first), layers(start / "sain"), strict=True
     ):
@@ -114,7 +115,7 @@ def test_l2_pulls_additive_networks_to_their_initial_weights(store, tmp_path):
     )
     fit("sain", store, drawn, tmp_path / "out")
     task = Task("sain", store, drawn, PLANAR)
-    first = trained_layers(begin(task)[0].network)
+    first = trained_layers(Mixture((task,)).begin()[0].network)
     found = trained_layers(load_network(tmp_path / "out")[0])
     # Drawn to zero, each weight would have gone the learning rate at every iteration.
     far = drawn.optimiser.iterations * drawn.optimiser.learning_rate
@@ -131,7 +132,7 @@ def test_a_fine_tuned_additive_network_stays_additive(store, tmp_path):
     assert (card.integrator, card.started_from) == ("relaxing-residual", None)
     assert np.abs(network.dyn.weights[-1]).max() > 0  # it has learned something
     task = Task("sain", store, residual, PLANAR)
-    silent = begin(task)[0].network
+    silent = Mixture((task,)).begin()[0].network
     batch = task.to_batch(store.read(slice(None)), store.info.steps)
     frame = push_frame(batch.scene, batch.initial)
     np.testing.assert_allclose(

@@ -23,8 +23,9 @@ from sainet.learning import fit as fit_module
 from sainet.learning.fit import STATE, fit
 from sainet.learning.held import predict_batch
 from sainet.learning.log import LOG, LogLine, append_log, read_log, rewind_log
+from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import PAPER
-from sainet.learning.task import Task, begin
+from sainet.learning.task import Task
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented, predict
@@ -157,7 +158,7 @@ def test_pushes_with_only_final_poses_can_be_trained_on(tmp_path):
     result = fit("in", store, config, tmp_path / "out")
     found = losses(result, "loss")
     assert np.isfinite(found).all()
-    state, weights = begin(Task("in", store, config, PLANAR))
+    state, (weights,) = Mixture((Task("in", store, config, PLANAR),)).begin()
     after, before = load_network(tmp_path / "out")[0].dyn, state.network.dyn
     moved = jax.tree.map(lambda a, b: float(abs(a - b).max()), after, before)
     assert min(jax.tree.leaves(moved)) > 1e-4  # no step was skipped as not finite

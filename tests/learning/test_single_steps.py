@@ -14,8 +14,9 @@ from sainet.learning.batches import to_single_steps
 from sainet.learning.checks import check_task
 from sainet.learning.fit import fit
 from sainet.learning.held import predict_batch
+from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import PAPER, SingleSteps
-from sainet.learning.task import Task, begin
+from sainet.learning.task import Task
 from sainet.models.card import read_card
 from sainet.models.dynamics import (
     LearnedDynamics,
@@ -158,7 +159,7 @@ def test_in_needs_no_restarting_engine(around_bullet):
     bullet = find_internal_engine("bullet")
     task = Task("in", around_bullet, CONFIG, bullet)
     check_task(task)
-    state, _ = begin(task)
+    state, _ = Mixture((task,)).begin()
     assert np.isfinite(state.network.scales.body_deviation).all()
 
 

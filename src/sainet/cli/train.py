@@ -1,8 +1,9 @@
 """`sainet train`."""
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from tyro.conf import AvoidSubcommands, Positional
 
@@ -15,6 +16,8 @@ from sainet.runs.errors import BadInput
 if TYPE_CHECKING:
     from sainet.datasets.store import Store
 
+T = TypeVar("T")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Train:
@@ -25,8 +28,9 @@ class Train:
 
     model: Positional[ModelKind]
     """Network: in (without an engine) or sain (around an engine)."""
-    data: Path
-    """Dataset to train on."""
+    data: tuple[Path, ...]
+    """Dataset to train on. Several, of different numbers of disks, train one
+    network."""
     out: Path
     """Run folder; identical settings resume."""
     assumed_engine: str = "planar"
@@ -81,7 +85,7 @@ class Job:
     """A network to train, and on which pushes."""
 
     model: ModelKind
-    data: Path
+    data: tuple[Path, ...]
     out: Path
     engine: str  # internal: a simulator, or the folder of identified parameters
     _: KW_ONLY
@@ -101,14 +105,14 @@ class Job:
         from sainet.learning.log import reported
         from sainet.report.figures.curves import draw_history
 
-        store = open_part(self.data, self.group, self.pushes)
+        stores = [open_part(path, self.group, self.pushes) for path in self.data]
         name, total = self.model.upper(), recipe.optimiser.iterations
         if self.members is not None:
-            return self._ensemble(store, recipe, output)
+            return self._ensemble(only(stores), recipe, output)
         with progress_bar(f"Training {name}", total, output) as advance:
             result = fit(
                 self.model,
-                store,
+                stores,
                 recipe,
                 self.out,
                 assumed_engine=self.engine,
@@ -139,3 +143,17 @@ class Job:
             )
         output.say(f"The ensemble is in {self.out}")
         return {"out": str(self.out), "model": self.model, "loss": loss}
+
+
+def only(given: Sequence[T]) -> T:
+    """Return the only dataset of what is trained on one.
+
+    Raises:
+        BadInput: there are several.
+    """
+    if len(given) > 1:
+        raise BadInput(
+            f"`data`: {len(given)} datasets; ensembles and Gaussian processes are "
+            "trained on one, give one."
+        )
+    return given[0]

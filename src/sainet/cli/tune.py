@@ -8,7 +8,7 @@ from tyro.conf import Positional
 
 from sainet.cli.output import Json, Output
 from sainet.cli.process import ProcessJob, for_networks
-from sainet.cli.train import Job
+from sainet.cli.train import Job, only
 from sainet.learning.recipes import FROM_ENGINE, RESIDUAL, recipe_for, start_named
 from sainet.models.identity import Features, ModelKind, ProcessFeatures
 
@@ -22,13 +22,14 @@ class Changes:
     for each output of gp)."""
     halve_every: int | None = None
     """Iterations between two halvings of the learning rate (default: 800 from the
-    engine, 200 from a network)."""
+    engine, 400 with the features 'contact', 200 from a network)."""
     l2: float | None = None
     """Weight of the squared changes of the weights in the loss: a smaller one allows
-    larger changes (default: 1 / pushes from the engine, 0.001 from a network)."""
+    larger changes (default: 1 / pushes from the engine, 0.001 from a network
+    and with the features 'contact')."""
     weight_rotation: float | None = None
     """Weight of rotations in the scaled loss (default: 2 from the engine, 1 from a
-    network)."""
+    network and with the features 'contact')."""
     batch_size: int = RESIDUAL.optimiser.batch_size
     """Pushes per gradient step."""
     learning_rate: float = RESIDUAL.optimiser.learning_rate
@@ -53,9 +54,10 @@ class Changes:
     iterations."""
     features: Features | ProcessFeatures | None = None
     """Inputs. Of a network: paper; place adds the place on the table and the absolute
-    angle, for pushes at one place of one table. Of a Gaussian process: angle, of the
-    contact; side adds the side of the disk; place adds both (default: paper, of a
-    Gaussian process side)."""
+    angle, for pushes at one place of one table; contact: those of each contact in its
+    own frame, for any number of disks (only from the engine). Of a Gaussian process:
+    angle, of the contact; side adds the side of the disk; place adds both (default:
+    paper, of a Gaussian process side)."""
     seed: int = RESIDUAL.seed
     """Random seed."""
     log_every: int = RESIDUAL.log_every
@@ -69,8 +71,9 @@ class Tune:
     model: Positional[ModelKind | Literal["gp"]]
     """Network: in (without an engine) or sain (around an engine). gp: a Gaussian
     process around an engine, for pushes of one or two disks."""
-    data: Path
-    """Dataset to train on."""
+    data: tuple[Path, ...]
+    """Dataset to train on. Several, of different numbers of disks, train one
+    network."""
     out: Path
     """Run folder; identical settings resume."""
     start: str = FROM_ENGINE
@@ -97,12 +100,13 @@ class Tune:
     def run(self) -> Json:
         """Train the network and draw its learning curve; or fit the process."""
         given = {k: v for k, v in asdict(self.changes).items() if v is not None}
-        job = self.data, self.out, self.engine, self.group, self.pushes
         if self.model == "gp":
+            job = only(self.data), self.out, self.engine, self.group, self.pushes
             given |= {"start": self.start, "devices": self.devices}
             given |= {"members": self.members}
             return ProcessJob(*job).run(given, asdict(Changes()), self.output)
-        recipe = recipe_for(start_named(self.start)).changed(**for_networks(given))
+        recipe = recipe_for(start_named(self.start), self.changes.features)
+        recipe = recipe.changed(**for_networks(given))
         return Job(
             self.model,
             self.data,

@@ -2,7 +2,7 @@
 
 import logging
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,22 +11,18 @@ import numpy as np
 from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
-from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
-from sainet.learning.checks import check_task
 from sainet.learning.log import LogLine, append_log, read_log, rewind_log
-from sainet.learning.loss import LossWeights
+from sainet.learning.mixture import Batches, Mixture, Validate
 from sainet.learning.recipes import FROM_ENGINE, FromModel, Recipe, Start
 from sainet.learning.step import (
     Best,
     FitState,
-    data_loss,
-    even_batch,
     make_step,
     trained_layers,
 )
-from sainet.learning.task import Existing, Task, begin, settings
+from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.correctors.network import AbstractNetwork
@@ -35,14 +31,13 @@ from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
 from sainet.runs.digests import digests_from_text, digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document
-from sainet.runs.errors import Diverged, UnknownName
+from sainet.runs.errors import BadInput, Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.interrupts import raise_if_interrupted
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
 from sainet.scenes.recording import AGREES
 
 STATE = "state.safetensors"
-Validate = Callable[[AbstractNetwork], float]
 Step = Callable[[FitState, PushBatch], tuple[FitState, Array]]
 _log = logging.getLogger(__name__)
 
@@ -62,7 +57,7 @@ class FitResult:
 
 def fit(
     model: ModelKind,
-    store: Store,
+    store: Store | Sequence[Store],
     recipe: Recipe,
     out: Path,
     *,
@@ -73,7 +68,8 @@ def fit(
 
     Args:
         model: `in` or `sain`.
-        store: training data.
+        store: training data; several datasets, of different numbers of disks, train
+            one network.
         recipe: with the start of training; `recipe_for` returns the one that fits a
             start.
         out: the run folder.
@@ -88,21 +84,27 @@ def fit(
         BadCheckpoint: training cannot start from that network.
         Diverged: the loss became NaN or infinite.
     """
+    stores = (store,) if isinstance(store, Store) else tuple(store)
+    if not stores:
+        raise BadInput("`data` is empty; give at least one dataset.")
     assumed = find_internal_engine(assumed_engine)
-    objective = recipe.objective.for_pushes(store.info.pushes)
-    recipe = replace(recipe, objective=objective)
-    task = Task(model, store, recipe, assumed, _existing(recipe.start))
-    check_task(task)
+    pushes = sum(each.info.pushes for each in stores)
+    recipe = replace(recipe, objective=recipe.objective.for_pushes(pushes))
+    existing = _existing(recipe.start)
+    mixture = Mixture(
+        tuple(Task(model, each, recipe, assumed, existing) for each in stores)
+    )
+    mixture.check()
     devices = jax.device_count()
-    folder = open_run(out, settings(task), finished_by=CARD, devices=devices)
+    folder = open_run(out, mixture.settings(), finished_by=CARD, devices=devices)
     if folder.is_finished:
         _log.info("%s is already finished", out)
         return FitResult(out, read_log(out))
     _warn_of_other_machine(folder, devices)
-    state, weights = begin(task)
-    is_fresh = task.existing is None and not task.is_additive
+    state, weights = mixture.begin()
+    is_fresh = existing is None and not mixture.lead.is_additive
     drawn_to = None if is_fresh else trained_layers(state.network)
-    validate = _make_validation(task, weights)
+    validate = mixture.validate(weights)
     best = Best.first(state.network, validate(state.network)) if validate else None
     if (out / STATE).is_file():
         state, best = load_arrays(out / STATE, (state, best))
@@ -110,9 +112,9 @@ def fit(
     # Match the step's output device: otherwise its second call compiles again.
     state = jax.device_put(state, jax.devices()[0])
     progress = Progress(state, best, list(history))
-    step = make_step(recipe, weights, drawn_to)
-    _iterate(task, progress, step, validate, out=out, on_step=on_step)
-    _finish(task, progress, folder)
+    steps = [make_step(recipe, each, drawn_to) for each in weights]
+    _iterate(mixture, progress, steps, validate, out=out, on_step=on_step)
+    _finish(mixture, progress, folder)
     return FitResult(out, tuple(progress.history))
 
 
@@ -164,23 +166,25 @@ class Progress:
 
 
 def _iterate(
-    task: Task,
+    mixture: Mixture,
     progress: Progress,
-    step: Step,
+    steps: Sequence[Step],
     validate: Validate | None,
     *,
     out: Path,
     on_step: Callable[[int, float | None], None],
 ) -> None:
-    recipe, history = task.recipe, progress.history
-    size, seed, total = recipe.optimiser.batch_size, recipe.seed, task.iterations
-    reader = BatchReader(task.training, task.names, size, seed, complete=task.complete)
+    recipe, history, total = (
+        mixture.lead.recipe,
+        progress.history,
+        mixture.lead.iterations,
+    )
+    batches = Batches(mixture)
     try:
         for iteration in range(int(progress.state.iteration) + 1, total + 1):
             raise_if_interrupted()
-            arrays = reader.batch(iteration - 1)
-            batch = even_batch(task.to_training_batch(*arrays, iteration))
-            progress.state, loss = step(progress.state, batch)
+            turn, batch = batches.take(iteration)
+            progress.state, loss = steps[turn](progress.state, batch)
             last = iteration == total
             if iteration % recipe.log_every == 0 or last:
                 _log_line(progress, iteration, float(loss), validate, out)
@@ -191,7 +195,7 @@ def _iterate(
             if progress.best and progress.best.is_stale(iteration, patience):
                 break
     finally:
-        reader.close()
+        batches.close()
 
 
 def _log_line(
@@ -216,20 +220,9 @@ def _log_line(
     progress.history.append(line)
 
 
-def _make_validation(task: Task, weights: LossWeights) -> Validate | None:
-    """Return a function that measures the loss on the validation pushes, if any."""
-    if task.validation is None:
-        return None
-    arrays = task.validation.read(slice(None), task.names)
-    batch = task.to_batch(arrays, task.store.info.steps)
-    known = int(batch.is_observed.sum())
-    # All as arguments: XLA would spend seconds on folding constants of a closure.
-    loss = jax.jit(data_loss)
-    return lambda network: float(loss(network, batch, weights)) / known
-
-
-def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
-    info, sain, history = task.store.info, task.model == "sain", progress.history
+def _finish(mixture: Mixture, progress: Progress, folder: RunFolder) -> None:
+    task, history, counts = mixture.lead, progress.history, mixture.counts
+    info, sain = task.store.info, task.model == "sain"
     data = save_arrays(folder.path / WEIGHTS, progress.network)
     is_additive = isinstance(progress.network.integrator, RelaxingResidual)
     start = task.existing.card if task.existing else None
@@ -240,11 +233,12 @@ def _finish(task: Task, progress: Progress, folder: RunFolder) -> None:
         truth_engine=info.engine,
         integrator="relaxing-residual" if is_additive else "acceleration",
         camera=task.assumed.camera if sain else AGREES,
-        data=task.store.content,
+        data=mixture.content,
         data_seeds=start.data_seeds if start else (),
-        disks=info.bodies,
-        trained_pushes=info.pushes,
-        pushes=_pushes(task.store, start),
+        disks=counts[-1],
+        counts=counts if counts[1:] else (),
+        trained_pushes=mixture.pushes,
+        pushes=_pushes(mixture, start),
         weights=content_hash(data),
         started_from=start.weights if start else None,
         recipe=task.recipe.settings(),
@@ -277,7 +271,7 @@ def _training_data(task: Task) -> TrainingData:
     return "stroke" if is_stroke else task.existing.card.identity.data
 
 
-def _pushes(store: Store, start: Card | None) -> str:
+def _pushes(mixture: Mixture, start: Card | None) -> str:
     """Return the pushes that the network was ever trained on, as far as known."""
     before = digests_from_text(start.pushes if start else "")
-    return digests_to_text(np.concatenate([before, store.push_hashes()]))
+    return digests_to_text(np.concatenate([before, mixture.push_hashes()]))

@@ -189,11 +189,11 @@ def _spread(
         mean, deviation = jnp.mean(rows, axis=1), jnp.std(rows, axis=1)
     else:
         shares = weights.reshape(-1) / jnp.maximum(jnp.sum(weights), _CONSTANT)
-        mean = jnp.sum(rows * shares, axis=1)
+        mean = jnp.sum(rows * shares[None], axis=1)
         if signs:
             mean = jnp.where(jnp.array(signs) < 0, 0.0, mean)
         spread = (rows - mean[:, None]) ** 2
-        deviation = jnp.sqrt(jnp.sum(spread * shares, axis=1))
+        deviation = jnp.sqrt(jnp.sum(spread * shares[None], axis=1))
     # A feature that never varies must not be divided by rounding errors.
     varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
     return mean, jnp.where(varies, deviation, 1.0)

@@ -187,7 +187,8 @@ class Recipe:
     start: Start = Fresh()
     features: Features = "paper"
     """Features of the network. place: the place on the table and the absolute angle
-    too, with which the friction of a real surface varies."""
+    too, with which the friction of a real surface varies. contact: those of each
+    contact in its own frame, for any number of disks (only around an engine)."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""
@@ -264,6 +265,10 @@ RESIDUAL = FINE_TUNING.changed(
     hold=8,
     weight_rotation=2.0,
 )
+# An addition to the engine at each contact, for any number of disks.
+CONTACT = RESIDUAL.changed(
+    features="contact", halve_every=400, l2=1e-3, weight_rotation=1.0
+)
 RECIPES = {Fresh: PAPER, FromModel: FINE_TUNING, FromSimulator: RESIDUAL}
 
 
@@ -274,10 +279,13 @@ def start_named(name: str | None) -> Start:
     return FromSimulator() if name == FROM_ENGINE else FromModel(name)
 
 
-def recipe_for(start: Start) -> Recipe:
+def recipe_for(start: Start, features: str | None = None) -> Recipe:
     """Return the recipe that fits a start, with that start.
 
     Args:
         start: random weights, a network, or the internal engine.
+        features: of the network; `contact` has a recipe of its own from the engine.
     """
+    if features == "contact" and isinstance(start, FromSimulator):
+        return CONTACT
     return replace(RECIPES[type(start)], start=start)

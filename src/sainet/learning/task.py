@@ -17,7 +17,6 @@ from sainet.engines.simulator import InternalEngine
 from sainet.learning.batches import mirror_some, to_single_steps
 from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import FROM_ENGINE, FromSimulator, Recipe, SingleSteps
-from sainet.learning.step import FitState, first_state
 from sainet.models.card import Card
 from sainet.models.checkpoint import features_of, new_network, untrained
 from sainet.models.correctors.interaction import InteractionNetwork
@@ -164,18 +163,17 @@ def settings(task: Task) -> dict[str, object]:
     }
 
 
-def begin(task: Task) -> tuple[FitState, LossWeights]:
-    """Return the first state and the weights of the loss, from the data."""
+def statistics(task: Task) -> tuple[Scales, LossWeights]:
+    """Return the scales of a network and the weights of the loss, from the data."""
     store = task.training
     few = slice(0, min(_STATISTICS_PUSHES, store.info.pushes))
     sample = task.to_sample(store.read(few, task.names))
     scales = feature_scales(sample, task.features, task.integrator)
-    network = _first_network(task, scales)
-    state = first_state(network, task.recipe.optimiser)
-    return state, loss_weights(sample, task.recipe.objective)
+    return scales, loss_weights(sample, task.recipe.objective)
 
 
-def _first_network(task: Task, scales: Scales) -> AbstractNetwork:
+def first_network(task: Task, scales: Scales) -> AbstractNetwork:
+    """Return the network that training begins with."""
     if task.existing is None:
         return new_network(
             task.features,

@@ -65,7 +65,8 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     integrator: Literal["acceleration", "relaxing-residual"] = "acceleration"
     camera: CameraOffset = AGREES  # of the internal engine
     data: str  # hash of the training data
-    disks: Count  # in each push of the training data
+    disks: Count  # in each push of the training data, at most
+    counts: tuple[Count, ...] = ()  # numbers of disks, if there are several
     trained_pushes: Count  # number of pushes in the training data
     data_seeds: tuple[int, ...] = ()  # of simulated training pushes not in `pushes`
     pushes: str = ""  # training pushes (`runs.digests`)
@@ -88,6 +89,11 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
             raise ValueError(
                 f"integrator is {self.integrator!r}; identity.kind must then be 'sain'"
             )
+
+    @property
+    def numbers_of_disks(self) -> tuple[int, ...]:
+        """The numbers of disks in the pushes of the training data."""
+        return self.counts or (self.disks,)
 
     @property
     def has_single_steps(self) -> bool:

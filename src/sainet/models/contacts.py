@@ -112,7 +112,7 @@ class ContactFeatures(AbstractFeatures):
         normal, distance = _toward(_others(motion[0:2]) - motion[0:2, None])
         own = jnp.stack([still.mass, still.radius])
         other = _others(own)
-        gap = distance - own[1] - other[1]
+        gap = distance - own[1][None] - other[1]
         rates = [
             (jnp.broadcast_to(rate[:, None], (3, *gap.shape)), _others(rate))
             for rate in (motion[3:6], self._simulated(moment))
@@ -146,7 +146,7 @@ def _length(vector: Float[Array, "2 *contact"]) -> Float[Array, "*contact"]:
 def _toward(offset: Float[Array, "2 *contact"]) -> tuple[Array, Array]:
     """Return unit vectors and lengths (m)."""
     distance = _length(offset)
-    return offset / distance, distance
+    return offset / distance[None], distance
 
 
 def _turned(vector: Array, normal: Array, way: int) -> Array:
