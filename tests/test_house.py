@@ -239,6 +239,14 @@ CHOOSING = (
 ENSEMBLES = ("models/ensemble", "learning/ensemble")
 ADAPTATION = ("identification/adaptation", "studies/adaptation")
 
+ANY_NUMBER = (
+    "models/contacts",
+    "models/correctors/contact",
+    # With lines that stood in learning/held.py before.
+    "models/correctors/held",
+    "learning/mixture",
+    "studies/any_number",
+)
 ENGINEER = (
     "cli/inspect",
     "datasets/doubts",
@@ -259,7 +267,14 @@ def modules_of(prefixes: tuple[str, ...]) -> list[Path]:
 
 ADDED = modules_of(ROBOTS)
 LATER = ADDED + modules_of(
-    WAY_IN + TRUST + VALIDATION + ADAPTATION + CHOOSING + ENGINEER + ENSEMBLES
+    WAY_IN
+    + TRUST
+    + VALIDATION
+    + ADAPTATION
+    + CHOOSING
+    + ENGINEER
+    + ENSEMBLES
+    + ANY_NUMBER
 )
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
@@ -271,6 +286,7 @@ CONNECTIONS = {
     "cross-validation": 10,
     "ensembles": 62,
     "provenance of identified engines": 10,
+    "contact networks and arrangements of disks": 165,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -325,6 +341,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(ADAPTATION))),
         250,
         250,
+    ),
+    "code lines of any number of disks": (
+        lambda: sum(map(code_lines, modules_of(ANY_NUMBER))),
+        500,
+        500,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),

@@ -8,8 +8,8 @@ from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
 from sainet.datasets.batch import to_batch, to_initial
 from sainet.learning import fit as fit_module
+from sainet.learning.batches import predict_batch
 from sainet.learning.fit import fit
-from sainet.learning.held import predict_batch
 from sainet.learning.loss import loss_weights, path_to_frame
 from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import (

@@ -20,8 +20,8 @@ from learning.stores import (
 from sainet.datasets.batch import to_batch
 from sainet.datasets.schema import simulated_name
 from sainet.learning import fit as fit_module
+from sainet.learning.batches import predict_batch
 from sainet.learning.fit import STATE, fit
-from sainet.learning.held import predict_batch
 from sainet.learning.log import LOG, LogLine, append_log, read_log, rewind_log
 from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import PAPER

@@ -12,10 +12,11 @@ import pytest
 from learning.stores import info_of, made_up
 from models.samples import network
 from sainet.datasets.batch import to_batch
-from sainet.learning.held import predict_batch, unroll_held
+from sainet.learning.batches import predict_batch
 from sainet.learning.loss import feature_scales
 from sainet.learning.recipes import PAPER
 from sainet.models.correctors import Start
+from sainet.models.correctors.held import unroll_held
 from sainet.models.inputs import push_frame
 from sainet.models.integrators import RelaxingResidual
 from sainet.runs.errors import BadInput

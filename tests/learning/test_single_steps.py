@@ -10,10 +10,9 @@ from models.samples import Glide, network, pushes
 from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
-from sainet.learning.batches import to_single_steps
+from sainet.learning.batches import predict_batch, to_single_steps
 from sainet.learning.checks import check_task
 from sainet.learning.fit import fit
-from sainet.learning.held import predict_batch
 from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import PAPER, SingleSteps
 from sainet.learning.task import Task

@@ -10,7 +10,7 @@ from learning.stores import end_points_alone, info_of, made_up, single
 from models import naive
 from models.samples import network
 from sainet.datasets.batch import to_batch
-from sainet.learning.held import predict_batch
+from sainet.learning.batches import predict_batch
 from sainet.learning.loss import (
     LossWeights,
     feature_scales,

@@ -93,3 +93,24 @@ def test_each_chunk_has_its_own_draws():
     )
     assert one == again
     assert len({one, other, seed}) == 3
+
+
+@pytest.mark.parametrize("disks", [3, 5])
+def test_disks_of_a_row_touch_the_one_before(disks):
+    found = gaps(drawn(disks=disks, arrangement="row", pushes=100))
+    assert np.abs(found[:, range(disks - 1), range(1, disks)]).max() < 1e-6
+    assert (
+        found[:, np.triu_indices(disks, 2)[0], np.triu_indices(disks, 2)[1]].min() > 0
+    )
+
+
+@pytest.mark.parametrize("disks", [3, 8])
+def test_disks_of_a_triangle_touch_two_others(disks):
+    found = gaps(drawn(disks=disks, arrangement="triangle", pushes=100))
+    touched = (np.abs(found) < 2e-6).sum(axis=(1, 2))
+    assert (touched >= 2 * (2 * disks - 3)).all()  # each contact in both triangles
+
+
+def test_a_negative_gap_is_an_overlap():
+    found = gaps(drawn(gap_mm=-2.0, pushes=50))
+    np.testing.assert_allclose(found[:, 0, 1], -0.002, atol=1e-6)

@@ -49,6 +49,7 @@ class Evaluate:
         from sainet.evaluation.evaluate import evaluate
         from sainet.evaluation.summary import summarise
         from sainet.models.library import load_model, other_worlds
+        from sainet.planning.checks import doubts_of_count
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table, write_table
 
@@ -59,6 +60,9 @@ class Evaluate:
         ]
         for warning in other_worlds(models, store.info.engine):
             self.output.warn(warning)
+        for model in models:
+            for doubt in doubts_of_count(model.card, store.info.bodies):
+                self.output.warn(f"{model.name}: {doubt}.")
         total = store.info.pushes * len(models)
         with progress_bar("Predicting", total, self.output) as advance:
             measured = evaluate(

@@ -28,9 +28,9 @@ class Reproduce:
     """Studies: direct-force-two-disks (the paper's Table I), direct-force-three-disks
     (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
     regularisation and robustness, with the networks of Table III; simulated-control and
-    adaptation, with shipped networks; expected-cost; robot-planar; engine-parity;
-    pretrained (the shipped networks); fine-tuning (settings chosen on simulated
-    pushes); recorded-pushes, recorded-trust, recorded-few, recorded-active,
+    adaptation, with shipped networks; any-number and gaps; expected-cost; robot-planar;
+    engine-parity; pretrained (the shipped networks); fine-tuning (settings chosen on
+    simulated pushes); recorded-pushes, recorded-trust, recorded-few, recorded-active,
     recorded-data-efficiency and lab-realism, which need --recorded; lab-collect,
     lab-prediction (Table IV), lab-control, lab-new-surface and lab-swapped-disks, in
     virtual labs. Default: every study whose requirements are met."""

@@ -120,7 +120,7 @@ def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
     """
     follows = config.swapped and config.given_properties == "true"
     model = load_model(config.model, order=(1, 0) if follows else None)
-    model.check_fits("robot", TIME_STEP, disks=config.disks)
+    model.check_fits("robot", TIME_STEP)
     if config.adapt:
         check_adapts(model)
     if config.expected_cost and not model.dynamics.has_regions:

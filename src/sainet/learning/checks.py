@@ -122,6 +122,6 @@ def _check_contacts(task: Task) -> None:
         )
     if task.inner is None or not (task.is_additive or task.existing):
         raise BadInput(
-            "`features` is contact: such a network adds to an engine; use 'sainet "
-            f"tune sain --start {FROM_ENGINE}'."
+            "`features` is contact: such a network adds to an engine; train sain, and "
+            f"give `start` {FROM_ENGINE}."
         )

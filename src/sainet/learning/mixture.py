@@ -140,7 +140,7 @@ def pool(scales: Sequence[Scales], bodies: Sequence[int]) -> Scales:
 def _pooled(each: Sequence[tuple[jax.Array, jax.Array]]) -> tuple[jax.Array, jax.Array]:
     means, deviations = (jnp.stack(x) for x in zip(*each, strict=True))
     mean = jnp.mean(means, axis=0)
-    within = jnp.mean(deviations**2 + (means - mean) ** 2, axis=0)
+    within = jnp.mean(deviations**2 + (means - mean[None]) ** 2, axis=0)
     return mean, jnp.sqrt(within)
 
 

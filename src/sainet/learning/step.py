@@ -15,7 +15,7 @@ from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch
 from sainet.engines.devices import BATCH, batch_mesh
-from sainet.learning.held import predict_batch
+from sainet.learning.batches import predict_batch
 from sainet.learning.loss import LossWeights, push_losses, to_target
 from sainet.learning.recipes import Optimiser, Recipe
 from sainet.models.correctors.network import AbstractNetwork

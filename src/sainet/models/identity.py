@@ -15,12 +15,16 @@ ModelKind = Literal["in", "sain"]  # of networks
 # "contact" is the form of contact networks, beyond the paper.
 Features = Literal["paper", "place", "contact"]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
-Variant = Literal["", "bystander", "single-steps", "for-all", "ensemble"]
+Variant = Literal["", "bystander", "single-steps", "for-all", "ensemble", "one-to-four"]
 
 NETWORKS = get_args(ModelKind)
 LEARNED = (*NETWORKS, "gp")
 _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
-_VARIANTS = {"single-steps": "single steps", "for-all": "all surfaces"}
+_VARIANTS = {
+    "single-steps": "single steps",
+    "for-all": "all surfaces",
+    "one-to-four": "one to four disks",
+}
 
 
 class ModelId(msgspec.Struct, frozen=True, kw_only=True):

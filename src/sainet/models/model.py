@@ -1,6 +1,5 @@
 """Models: a dynamics model with its identity, and the card of its network."""
 
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -119,24 +118,18 @@ class Model:
         *,
         seed: int | None = None,
         pushes: UInt64[np.ndarray, " push"] | None = None,
-        disks: int | None = None,
     ) -> None:
         """Raise `BadCheckpoint` if the network is not for these pushes.
-
-        A network that was trained on other numbers of disks causes a warning.
 
         Args:
             kind: setup of the pushes.
             time_step: of the pushes (s).
             seed: of simulated test pushes; None otherwise.
             pushes: hashes of the test pushes (`Store.push_hashes`); None: unknown.
-            disks: in each push; None: unknown.
         """
         if self.card is None:
             self._check_unseen(pushes)
             return
-        if disks is not None and isinstance(self.card, Card):
-            self._warn_of_counts(self.card.numbers_of_disks, disks)
         path = f"{self.folder}/{self.card.file}" if self.folder else self.name
         if self.card.kind != kind:
             raise BadCheckpoint(
@@ -155,16 +148,6 @@ class Model:
                 "`seed`, or give `force`."
             )
         self._check_unseen(pushes)
-
-    def _warn_of_counts(self, trained: tuple[int, ...], disks: int) -> None:
-        if trained[0] <= disks <= trained[-1]:
-            return
-        known = " to ".join(map(str, sorted({trained[0], trained[-1]})))
-        warnings.warn(
-            f"{self.name} was trained on pushes of {known} disks, these have {disks}; "
-            "compare it with physics-true, or train a network on such pushes.",
-            stacklevel=3,
-        )
 
     def _check_unseen(self, pushes: UInt64[np.ndarray, " push"] | None) -> None:
         """Raise `BadCheckpoint` if the model was fitted to some of these pushes."""

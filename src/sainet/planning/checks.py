@@ -75,9 +75,23 @@ def doubts_of_training(card: Card | ProcessCard | None, disks: int) -> Iterator[
             f"its network was trained on {card.trained_pushes} pushes; give it at "
             f"least {_FEW_PUSHES}"
         )
-    if card.disks != disks:
+    yield from doubts_of_count(card, disks)
+
+
+def doubts_of_count(card: Card | ProcessCard | None, disks: int) -> Iterator[str]:
+    """Yield a reason why predictions may fail: fewer disks than in training, or more.
+
+    Args:
+        card: of the network; None without one.
+        disks: in the scene.
+    """
+    if card is None:
+        return
+    trained = card.numbers_of_disks if isinstance(card, Card) else (card.disks,)
+    if not trained[0] <= disks <= trained[-1]:
+        known = " to ".join(map(str, sorted({trained[0], trained[-1]})))
         yield (
-            f"its network was trained on pushes of {card.disks} disk(s), this scene "
+            f"its network was trained on pushes of {known} disk(s), this scene "
             f"has {disks}; train it on such pushes"
         )
 

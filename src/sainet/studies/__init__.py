@@ -21,6 +21,8 @@ STUDIES = {
     "direct-force-three-disks": "sainet.studies.paper_tables:DIRECT_FORCE_THREE_DISKS",
     "robot-two-disks": "sainet.studies.paper_tables:ROBOT_TWO_DISKS",
     "data-efficiency": "sainet.studies.data_efficiency:SIMULATED",
+    "any-number": "sainet.studies.any_number:NUMBERS",
+    "gaps": "sainet.studies.any_number:GAPS",
     "recurrent-or-not": "sainet.studies.variants:RECURRENT_OR_NOT",
     "regularisation": "sainet.studies.variants:REGULARISATION",
     "robustness": "sainet.studies.robustness:STUDY",

@@ -223,6 +223,10 @@ class Train(Step[Model]):
         """The number of its iterations."""
         return self.recipe.optimiser.iterations
 
+    def stores(self, runner: "Runner") -> Store | tuple[Store, ...]:
+        """Return the training pushes."""
+        return runner.result(self.pushes)
+
     def is_finished(self, runner: "Runner") -> bool:
         """Return whether the folder has a network; `run` checks which."""
         return (runner.folder(self) / CARD).is_file()
@@ -239,7 +243,7 @@ class Train(Step[Model]):
         return partial(
             fit,
             "in" if self.id.kind == "in" else "sain",
-            runner.result(self.pushes),
+            self.stores(runner),
             recipe,
             runner.folder(self),
             assumed_engine=engine,
@@ -253,6 +257,16 @@ class Train(Step[Model]):
             )
             bar.reach(self.iterations, loss_note(result.loss))
         return replace(load_model(str(runner.folder(self))), id=self.id)
+
+
+class TrainMixture(Train):
+    """One training run of a network on datasets of several numbers of disks."""
+
+    more: tuple[Step[Store], ...] = ()  # further training pushes
+
+    def stores(self, runner: "Runner") -> tuple[Store, ...]:
+        """Return the training pushes, one dataset for each number of disks."""
+        return tuple(runner.result(each) for each in (self.pushes, *self.more))
 
 
 class Evaluate(Step[Measurements]):

@@ -35,6 +35,7 @@ class AbstractTask(eqx.Module):
 
 TOLERANCE_RADII = 0.1
 ALIGNMENT = 3.0
+_ROW = 3  # factor of w with three disks or more
 
 
 class PushToGoal(AbstractTask):
@@ -43,6 +44,11 @@ class PushToGoal(AbstractTask):
     The cost is the paper's heuristic, ``|p_m - g| + w (1 - cos)``, with the cosine of
     the angle at disk 1 between the goal and the target disk: this term keeps both disks
     and the goal on one line. (The paper adds a length and a number, w = 1.)
+
+    In a row of more disks, the angle at the last but one counts, and one for each disk
+    before it. To turn the target disk towards the goal, the disk behind it has to move
+    the other way: its wanted direction is mirrored at the line of the two, and so on to
+    disk 1. Rows buckle easily, so that w is three times as large.
     """
 
     goal: Float[Array, " 2"]  # m
@@ -61,11 +67,16 @@ class PushToGoal(AbstractTask):
 
     def cost(self, state: State) -> Float[Array, "*batch"]:
         """Return the paper's heuristic h(p_1, p_m, g) (m)."""
-        pushed = state.position[..., 0, :]
-        ahead, wanted = self._moved(state) - pushed, self._to_goal(pushed)
-        lengths = jnp.maximum(norm(ahead) * norm(wanted), 1e-12)
-        cosine = jnp.sum(ahead * wanted, axis=-1) / lengths
-        return self.distance(state) + self.alignment * (1 - cosine)
+        cost, place = self.distance(state), state.position
+        weight = self.alignment * (_ROW if self.moved > 1 else 1)
+        wanted = self._to_goal(place[..., max(self.moved - 1, 0), :])
+        for disk in reversed(range(max(self.moved, 1))):
+            ahead = place[..., min(disk + 1, self.moved), :] - place[..., disk, :]
+            lengths = jnp.maximum(norm(ahead) * norm(wanted), 1e-12)
+            cosine = jnp.sum(ahead * wanted, axis=-1) / lengths
+            cost += weight * (1 - cosine)
+            wanted = _mirrored(wanted, ahead)
+        return cost
 
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
         """Return whether the target disk is within the tolerance of the goal."""
@@ -82,6 +93,15 @@ class PushToGoal(AbstractTask):
 
     def _to_goal(self, place: Float[Array, "*batch 2"]) -> Float[Array, "*batch 2"]:
         return jnp.broadcast_to(self.goal, place.shape) - place
+
+
+def _mirrored(
+    vector: Float[Array, "*batch 2"], axis: Float[Array, "*batch 2"]
+) -> Float[Array, "*batch 2"]:
+    """Return vectors mirrored at lines along others."""
+    squared = jnp.maximum(jnp.sum(axis**2, axis=-1, keepdims=True), 1e-12)
+    along = jnp.sum(vector * axis, axis=-1, keepdims=True) / squared * axis
+    return 2 * along - vector
 
 
 GoalKind = Literal["easy", "hard"]

@@ -8,6 +8,9 @@ from sainet.scenes import quantities
 from sainet.worlds.noise import NoiseConfig, NoiseLevel
 
 SetupName = Literal["robot", "direct-force"]
+# cluster: disks 2 and 3 touch disk 1, further ones any other (the paper). row: each
+# touches the one before. triangle: each further one touches two others.
+Arrangement = Literal["cluster", "row", "triangle"]
 Range = tuple[float] | tuple[float, float]
 _RIGHT_ANGLE = 90  # degrees
 
@@ -27,7 +30,7 @@ _RANGES = {
 _QUANTITIES = {
     "pusher_radius_mm": quantities.PUSHER_RADIUS.times(1000, "mm"),
     "force_n": quantities.PUSHING_FORCE,
-    "gap_mm": quantities.GAP.times(1000, "mm"),
+    "gap_mm": quantities.START_GAP.times(1000, "mm"),
 }
 
 
@@ -57,8 +60,13 @@ class WorldConfig:
     placement_deg: float = 60.0
     """Largest angle between the line of two neighbouring disks and the push frame's x
     axis (degrees)."""
+    arrangement: Arrangement = "cluster"
+    """Arrangement of the disks: cluster (disks 2 and 3 touch disk 1, further ones any
+    other), row (each touches the one before) or triangle (disk 2 touches disk 1,
+    further ones two others)."""
     gap_mm: float = 0.0
-    """Initial gap between neighbouring disks, and between disk 1 and pusher (mm)."""
+    """Initial gap between neighbouring disks, and between disk 1 and pusher (mm);
+    negative: they overlap."""
     stroke_mm: Range = (10.0,)
     """Stroke of a push (mm, range; robot)."""
     speed_mm_s: Range = (50.0,)
@@ -82,6 +90,7 @@ class WorldConfig:
             BadSetting: a value is out of its range.
         """
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
+        require_one_of("arrangement", self.arrangement, get_args(Arrangement))
         for name, (low, high) in _COUNTS.items():
             quantities.require_count(name, getattr(self, name), low=low, high=high)
         for name, quantity in _RANGES.items():

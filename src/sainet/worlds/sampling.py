@@ -104,9 +104,9 @@ def _place(
 ) -> Float[np.ndarray, "body 2"]:
     """Place disk 1 at the origin and every other disk in front of an earlier disk.
 
-    Disks 2 and 3 touch disk 1, as in the paper. Disk 1 has no room for more, so each
-    further disk touches any earlier disk. If the placed disks leave no room for the
-    next, the arrangement starts again.
+    In a cluster, disks 2 and 3 touch disk 1, as in the paper. Disk 1 has no room for
+    more, so each further disk touches any earlier disk. If the placed disks leave no
+    room for the next, the arrangement starts again.
     """
     for _ in range(_ARRANGEMENTS):
         placed = [np.zeros(2)]
@@ -163,15 +163,52 @@ def _find_room(
     radius: Float[np.ndarray, " body"],
 ) -> Float[np.ndarray, " 2"] | None:
     """Return a place for the next disk, None if no try found room."""
-    body = len(placed)
     for _ in range(_TRIES):
-        parent = 0 if body < 3 else int(rng.integers(body))  # noqa: PLR2004
-        angle = np.deg2rad(rng.uniform(-config.placement_deg, config.placement_deg))
-        reach = radius[parent] + radius[body] + config.gap_mm / 1000
-        place = placed[parent] + reach * np.array([np.cos(angle), np.sin(angle)])
-        if _is_free(place, radius[body], placed, radius, skip=parent):
+        place, parents = _draw_place(config, rng, placed, radius)
+        body = len(placed)
+        if place is not None and _is_free(place, radius[body], placed, radius, parents):
             return place
     return None
+
+
+def _draw_place(
+    config: WorldConfig,
+    rng: np.random.Generator,
+    placed: list[np.ndarray],
+    radius: Float[np.ndarray, " body"],
+) -> tuple[Float[np.ndarray, " 2"] | None, tuple[int, ...]]:
+    """Return a place where the next disk touches others, and which; None: nowhere."""
+    body, gap = len(placed), config.gap_mm / 1000
+    if config.arrangement == "triangle" and body > 1:
+        one, other = map(int, rng.choice(body, 2, replace=False))
+        reach = radius[[one, other]] + radius[body] + gap
+        side = int(rng.choice([-1, 1]))
+        return _corner(placed[one], placed[other], reach, side), (one, other)
+    parent = body - 1
+    if config.arrangement != "row":
+        parent = 0 if body < 3 else int(rng.integers(body))  # noqa: PLR2004
+    angle = np.deg2rad(rng.uniform(-config.placement_deg, config.placement_deg))
+    reach = radius[parent] + radius[body] + gap
+    place = placed[parent] + reach * np.array([np.cos(angle), np.sin(angle)])
+    return place, (parent,)
+
+
+def _corner(
+    one: np.ndarray, other: np.ndarray, reach: np.ndarray, side: int
+) -> Float[np.ndarray, " 2"] | None:
+    """Return the point at two distances from two points, on one side, ahead of one.
+
+    None if they are too far apart, or if it would be behind both.
+    """
+    way = other - one
+    apart = np.hypot(*way)
+    along = (apart**2 + reach[0] ** 2 - reach[1] ** 2) / (2 * apart)
+    across = reach[0] ** 2 - along**2
+    if across <= 0:
+        return None
+    normal = np.array([-way[1], way[0]]) * side
+    place = one + (along * way + np.sqrt(across) * normal) / apart
+    return place if place[0] > min(one[0], other[0]) else None
 
 
 def _is_free(
@@ -179,10 +216,9 @@ def _is_free(
     radius: float,
     placed: list[np.ndarray],
     radii: Float[np.ndarray, " body"],
-    *,
-    skip: int,
+    touched: tuple[int, ...],
 ) -> bool:
-    others = [i for i in range(len(placed)) if i != skip]
+    others = [i for i in range(len(placed)) if i not in touched]
     return all(
         np.hypot(*(place - placed[i])) >= radius + radii[i] + 1e-6 for i in others
     )

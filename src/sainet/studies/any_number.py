@@ -1,0 +1,151 @@
+"""Any number of disks: what networks of two disks, or of one to four, predict of more.
+
+Bullet is the truth. A contact network corrects the engine with the true masses and
+radii; the paper's networks are the shipped ones, trained on two disks.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from msgspec import structs
+
+from sainet.datasets.config import GenerateConfig
+from sainet.engines.simulator import SIMULATORS
+from sainet.evaluation.claims import Claim, errs_less
+from sainet.evaluation.measurements import Condition
+from sainet.learning.recipes import CONTACT, Recipe
+from sainet.models.identity import ModelId
+from sainet.models.model import Model
+from sainet.studies import Scale
+from sainet.studies.paper_setup import IN, SAIN, physics
+from sainet.studies.steps import (
+    Evaluate,
+    Join,
+    Load,
+    Simulate,
+    Step,
+    Train,
+    TrainMixture,
+)
+from sainet.studies.study import Plan, Scope, Study
+from sainet.worlds.config import Arrangement
+
+CONTACTS = ModelId(
+    kind="sain",
+    simulator=SIMULATORS["planar-true"],
+    data="residual",
+    features="contact",
+)
+MIXED = structs.replace(CONTACTS, variant="one-to-four")
+TRAINED = (1, 2, 3, 4)  # disks
+TESTED = (2, 3, 5, 8)
+ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
+GAPS_MM = (-2, -1, 0, 1, 2, 5)
+# Training pushes of each number of disks, test pushes of each condition, iterations.
+SIZES = {"quick": (60, 40, 20), "paper": (1500, 500, None)}
+TRAININGS = {"quick": 1, "paper": 5}
+_TRAINING_SEED, _TEST_SEED = 100, 200
+
+
+def _simulated(label: str, pushes: int, seed: int, config: GenerateConfig) -> Simulate:
+    whole = replace(
+        config,
+        pushes=pushes,
+        seed=seed,
+        engine="bullet",
+        assumed_engine=("planar", "planar-true"),
+        chunk_size=min(config.chunk_size, pushes),
+    )
+    return Simulate(label, whole)
+
+
+def training_pushes(scale: Scale, disks: int) -> Simulate:
+    """Return the training pushes of a number of disks."""
+    config = GenerateConfig(disks=disks)
+    seed = _TRAINING_SEED + disks
+    return _simulated(f"train-{disks}-disks", SIZES[scale][0], seed, config)
+
+
+def test_pushes(scale: Scale, config: GenerateConfig, label: str) -> Simulate:
+    """Return test pushes of a condition."""
+    seed = _TEST_SEED + config.disks
+    return _simulated(f"test-{label}", SIZES[scale][1], seed, config)
+
+
+def of_two(scale: Scale) -> tuple[Train, ...]:
+    """Return contact networks that are trained on pushes of two disks."""
+    pushes = training_pushes(scale, 2)
+    return tuple(Train(CONTACTS, pushes, recipe) for recipe in _recipes(scale))
+
+
+def of_one_to_four(scale: Scale) -> tuple[TrainMixture, ...]:
+    """Return contact networks that are trained on pushes of one to four disks."""
+    first, *others = (training_pushes(scale, disks) for disks in TRAINED)
+    return tuple(
+        TrainMixture(MIXED, first, recipe, more=tuple(others))
+        for recipe in _recipes(scale)
+    )
+
+
+def _recipes(scale: Scale) -> Iterator[Recipe]:
+    iterations = SIZES[scale][2] or CONTACT.optimiser.iterations
+    batch = min(CONTACT.optimiser.batch_size, SIZES[scale][0])
+    for seed in range(TRAININGS[scale]):
+        yield CONTACT.changed(iterations=iterations, seed=seed, batch_size=batch)
+
+
+def _paper() -> tuple[Step[Model], ...]:
+    """Return physics and the paper's networks."""
+    return (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
+
+
+def _numbers(scope: Scope) -> Plan:
+    """Return the errors against the number of disks, in each arrangement."""
+    scale = scope.scale
+    models = (*_paper(), *of_two(scale), *of_one_to_four(scale))
+    parts = []
+    for disks in TESTED:
+        for arrangement in ARRANGEMENTS if disks > 2 else ("cluster",):  # noqa: PLR2004
+            label = f"{disks} disks" + (f", {arrangement}" if disks > 2 else "")  # noqa: PLR2004
+            config = GenerateConfig(disks=disks, arrangement=arrangement)
+            factors: dict[str, float | str] = {
+                "disks": disks,
+                "arrangement": arrangement,
+            }
+            tests = test_pushes(scale, config, label)
+            named = Condition(label=label, factors=factors)
+            parts.append(Evaluate(models, tests, named))
+    return Plan(Join(tuple(parts)))
+
+
+def _gaps(scope: Scope) -> Plan:
+    """Return the errors of two disks against the gap between them at the start."""
+    scale, parts = scope.scale, []
+    for gap in GAPS_MM:
+        label = f"gap of {gap} mm"
+        tests = test_pushes(scale, GenerateConfig(gap_mm=gap), label)
+        named = Condition(label=label, factors={"gap_mm": gap})
+        parts.append(Evaluate((*_paper(), *of_two(scale)), tests, named))
+    return Plan(Join(tuple(parts)))
+
+
+NUMBERS = Study(
+    question="Do networks that were trained on few disks predict pushes of more?",
+    plan=_numbers,
+    subject=CONTACTS.slug,
+    claims=tuple(
+        Claim(
+            f"a contact network trained on two disks errs less than its engine, "
+            f"{disks} disks",
+            errs_less(
+                CONTACTS.slug, "physics-true", condition=f"{disks} disks, cluster"
+            ),
+        )
+        for disks in TESTED[1:]
+    ),
+)
+GAPS = Study(
+    question="How do errors depend on the gap between two disks at the start?",
+    plan=_gaps,
+    subject=CONTACTS.slug,
+)

@@ -1,0 +1,133 @@
+"""One network of datasets with several numbers of disks: reproducible, resumable."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from learning.stores import info_of, made_up, write
+from sainet.cli.entry import run
+from sainet.learning import fit as fit_module
+from sainet.learning.fit import STATE, fit
+from sainet.learning.mixture import Batches, Mixture, pool
+from sainet.learning.recipes import CONTACT, PAPER
+from sainet.learning.task import Task
+from sainet.models.card import WEIGHTS, read_card
+from sainet.models.correctors.network import Scales
+from sainet.models.library import find_internal_engine, load_model
+from sainet.planning.checks import doubts_of_count
+from sainet.runs.errors import BadInput, BadStore
+
+RECIPE = CONTACT.changed(
+    iterations=6, batch_size=4, average=2, checkpoint_every=2, log_every=1
+)
+SIZES = {1: 6, 2: 12, 3: 6}  # pushes by the number of disks
+
+
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("mixture")
+
+    def one(disks):
+        info = info_of(SIZES[disks], bodies=disks)
+        return write(folder / f"of-{disks}", info, made_up(info, seed=disks))
+
+    return [one(disks) for disks in SIZES]
+
+
+def mixture(stores, recipe=RECIPE):
+    engine = find_internal_engine("planar")
+    return Mixture(tuple(Task("sain", each, recipe, engine) for each in stores))
+
+
+def test_a_batch_has_one_number_of_disks_and_each_its_share(stores):
+    batches = Batches(mixture(stores, RECIPE.changed(iterations=400)))
+    found = [batches.take(iteration) for iteration in range(1, 401)]
+    batches.close()
+    assert all(batch.truth.shape[2] == turn + 1 for turn, batch in found)
+    share = np.bincount([turn for turn, _ in found]) / 400
+    np.testing.assert_allclose(share, [0.25, 0.5, 0.25], atol=0.06)
+
+
+def test_an_interrupted_mixture_ends_with_the_same_network(
+    stores, tmp_path, monkeypatch
+):
+    fit("sain", stores, RECIPE, tmp_path / "whole")
+    steps = iter(range(4))
+
+    def stop():
+        if next(steps, None) is None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(fit_module, "raise_if_interrupted", stop)
+    with pytest.raises(KeyboardInterrupt):
+        fit("sain", stores, RECIPE, tmp_path / "cut")
+    assert (tmp_path / "cut" / STATE).is_file()
+    monkeypatch.undo()
+    fit("sain", stores, RECIPE, tmp_path / "cut")
+    whole, cut = ((tmp_path / name / WEIGHTS).read_bytes() for name in ("whole", "cut"))
+    assert whole == cut
+    card = read_card(tmp_path / "whole")
+    assert (card.numbers_of_disks, card.disks) == ((1, 2, 3), 3)
+    assert card.trained_pushes == sum(SIZES.values())
+    model = load_model(str(tmp_path / "whole"))
+    assert not [*doubts_of_count(model.card, 2)]
+    (doubt,) = doubts_of_count(model.card, 5)
+    assert "1 to 3" in doubt
+    assert "5" in doubt
+
+
+def test_the_papers_networks_train_on_mixtures_too(stores, tmp_path):
+    recipe = PAPER.changed(iterations=2, batch_size=4, steps=12)
+    fit("in", stores[1:], recipe, tmp_path / "in")
+    assert read_card(tmp_path / "in").numbers_of_disks == (2, 3)
+
+
+def test_pooled_statistics_are_those_of_all_numbers():
+    rng = np.random.default_rng(0)
+    parts = [rng.normal(shift, spread, (50, 4)) for shift, spread in ((1, 2), (-3, 1))]
+
+    def scales(x, size):
+        mean, deviation = jnp.asarray(x.mean(0)), jnp.asarray(x.std(0))
+        return Scales(mean, deviation, mean, deviation, jnp.full(3, size))
+
+    found = pool([scales(parts[0], 3.0), scales(parts[1], 4.0)], [2, 3])
+    whole = np.concatenate(parts)
+    np.testing.assert_allclose(found.body_mean, whole.mean(0), rtol=1e-5)
+    np.testing.assert_allclose(found.pair_deviation, whole.std(0), rtol=1e-5)
+    np.testing.assert_allclose(found.acceleration, 12.5**0.5, rtol=1e-6)
+    alone = pool([scales(parts[0], 3.0), scales(parts[1], 4.0)], [1, 3])
+    np.testing.assert_allclose(alone.pair_mean, parts[1].mean(0), rtol=1e-5)
+
+
+def test_datasets_that_do_not_belong_together_are_refused(stores, tmp_path):
+    info = info_of(6, bodies=2, time_step=0.01)
+    other = write(tmp_path / "slow", info, made_up(info))
+    with pytest.raises(BadStore, match="slow: time_step is 0.01"):
+        fit("sain", [stores[1], other], RECIPE, tmp_path / "out")
+    info = info_of(6, bodies=3, assumed_engines=())
+    arrays = made_up(info)
+    del arrays["simulated_planar"]
+    without = write(tmp_path / "without", info, arrays)
+    with pytest.raises(BadStore, match="without: no simulator prediction of planar"):
+        fit("sain", [stores[1], without], RECIPE, tmp_path / "out")
+    with pytest.raises(BadInput, match="`data` is empty"):
+        fit("sain", [], RECIPE, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["train", "sain", "--features", "contact"], "give `start` engine"),
+        (["tune", "in", "--features", "contact"], "engine"),
+        (["tune", "gp"], "3 datasets.*give one"),
+        (["tune", "sain", "--members", "2"], "3 datasets.*give one"),
+    ],
+)
+def test_bad_mixtures_end_in_one_line(stores, words, message, tmp_path, capsys):
+    data = [str(each.path) for each in stores]
+    given = [*words, "--data", *data, "--out", str(tmp_path / "out"), "--quiet"]
+    assert run(given) == 2
+    error = capsys.readouterr().err.strip()
+    assert "\n" not in error
+    assert np.char.find(error, message.split(".*")[0]) >= 0
