@@ -157,14 +157,14 @@ def test_the_best_network_on_the_validation_pushes_is_kept(
     told = iter([0.9, 0.8, 0.3, 0.5, 0.4, 0.6, 0.7, 0.7, 0.7])
     kept = []
 
-    def validation(task, weights):
+    def validation(mixture, weights):
         def validate(network):
             kept.append(network)
             return next(told)
 
         return validate
 
-    monkeypatch.setattr(fit_module, "_make_validation", validation)
+    monkeypatch.setattr(fit_module.Mixture, "validate", validation)
     patient = TUNING.changed(patience=4)
     result = fit(
         "in",

@@ -164,12 +164,10 @@ def feature_scales(
             features.of_pairs, features.pair_weights, features.pair_signs
         )
     else:
-        size = features.pair_size
-        pair_mean, pair_deviation = jnp.zeros(size), jnp.ones(size)
+        pair_mean = jnp.zeros(features.pair_size)
+        pair_deviation = jnp.ones_like(pair_mean)
     change = (motion[..., 3:6] - before[..., 3:6]) / batch.scene.time_step
-    size = jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
-    if isinstance(integrator, RelaxingResidual):
-        size = _correction(batch, integrator)
+    size = _output_size(batch, integrator, change)
     return Scales(
         pair_mean=pair_mean,
         pair_deviation=pair_deviation,
@@ -240,6 +238,13 @@ def _errors(batch: PushBatch) -> tuple[Array, Array]:
         where(batch.pose_observed, error[..., 0:3]),
         where(batch.rate_observed, error[..., 3:6]),
     )
+
+
+def _output_size(batch: PushBatch, integrator: Integrator, change: Array) -> Array:
+    """Return the size of the true accelerations, or of those that correct s-bar."""
+    if isinstance(integrator, RelaxingResidual):
+        return _correction(batch, integrator)
+    return jnp.sqrt(jnp.mean(change**2, axis=(0, 1, 2)))
 
 
 def _correction(batch: PushBatch, integrator: RelaxingResidual) -> Array:

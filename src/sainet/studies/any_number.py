@@ -6,10 +6,12 @@ radii; the paper's networks are the shipped ones, trained on two disks.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from msgspec import structs
 
 from sainet.datasets.config import GenerateConfig
+from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
@@ -25,10 +27,12 @@ from sainet.studies.steps import (
     Simulate,
     Step,
     Train,
-    TrainMixture,
 )
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import Arrangement
+
+if TYPE_CHECKING:
+    from sainet.studies.runner import Runner
 
 CONTACTS = ModelId(
     kind="sain",
@@ -45,6 +49,16 @@ GAPS_MM = (-2, -1, 0, 1, 2, 5)
 SIZES = {"quick": (60, 40, 20), "paper": (1500, 500, None)}
 TRAININGS = {"quick": 1, "paper": 5}
 _TRAINING_SEED, _TEST_SEED = 100, 200
+
+
+class TrainMixture(Train):
+    """One training run of a network on datasets of several numbers of disks."""
+
+    more: tuple[Step[Store], ...] = ()  # further training pushes
+
+    def stores(self, runner: "Runner") -> tuple[Store, ...]:
+        """Return the training pushes, one dataset for each number of disks."""
+        return tuple(runner.result(each) for each in (self.pushes, *self.more))
 
 
 def _simulated(label: str, pushes: int, seed: int, config: GenerateConfig) -> Simulate:

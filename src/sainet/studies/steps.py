@@ -38,10 +38,7 @@ _DIGEST = 10  # characters of a hash in the name of a folder
 @dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Step(abc.ABC, Generic[T]):
-    """A piece of work: equal settings and inputs make one step, run once.
-
-    Its subclasses are frozen dataclasses.
-    """
+    """A piece of work, run once for equal settings and inputs: a frozen dataclass."""
 
     def __init_subclass__(cls) -> None:
         """Make the class a frozen dataclass."""
@@ -257,16 +254,6 @@ class Train(Step[Model]):
             )
             bar.reach(self.iterations, loss_note(result.loss))
         return replace(load_model(str(runner.folder(self))), id=self.id)
-
-
-class TrainMixture(Train):
-    """One training run of a network on datasets of several numbers of disks."""
-
-    more: tuple[Step[Store], ...] = ()  # further training pushes
-
-    def stores(self, runner: "Runner") -> tuple[Store, ...]:
-        """Return the training pushes, one dataset for each number of disks."""
-        return tuple(runner.result(each) for each in (self.pushes, *self.more))
 
 
 class Evaluate(Step[Measurements]):
