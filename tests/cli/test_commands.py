@@ -94,7 +94,7 @@ def test_without_arguments_the_help_is_printed():
         (("generate", "robot", "--pushes", "0"), ("--pushes", "at least 1")),
         (("generate", "robot", "--radius-mm", "-1"), ("--radius-mm", "from 1")),
         (("generate", "robot", "--mass-kg", "nan"), ("--mass-kg", "nan")),
-        (("generate", "robot", "--gap-mm", "-2"), ("--gap-mm", "from 0")),
+        (("generate", "robot", "--gap-mm", "-9"), ("--gap-mm", "from -5")),
         (("generate", "robot", "--workers", "0"), ("--workers", "at least 1")),
         (("generate", "robot", "--disks", "1000000"), ("--disks", "from 1 to 100")),
         (("generate", "robot", "--engine", "planer"), ("--engine", "mean planar?")),

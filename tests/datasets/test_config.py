@@ -49,7 +49,7 @@ BAD = [
     ("contact_angle_deg", NAN),
     ("direction_deg", -1.0),
     ("placement_deg", 120.0),
-    ("gap_mm", -1.0),
+    ("gap_mm", -6.0),
     ("gap_mm", NAN),
     ("gap_mm", INFINITE),
     ("disks", 1_000_000),
