@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jax
+import msgspec
 import numpy as np
 from jaxtyping import Array
 
@@ -236,7 +237,7 @@ def _finish(mixture: Mixture, progress: Progress, folder: RunFolder) -> None:
         data=mixture.content,
         data_seeds=start.data_seeds if start else (),
         disks=counts[-1],
-        counts=counts if counts[1:] else (),
+        counts=counts if counts[1:] else msgspec.UNSET,
         trained_pushes=mixture.pushes,
         pushes=_pushes(mixture, start),
         weights=content_hash(data),

@@ -66,7 +66,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     camera: CameraOffset = AGREES  # of the internal engine
     data: str  # hash of the training data
     disks: Count  # in each push of the training data, at most
-    counts: tuple[Count, ...] = ()  # numbers of disks, if there are several
+    counts: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET  # several numbers
     trained_pushes: Count  # number of pushes in the training data
     data_seeds: tuple[int, ...] = ()  # of simulated training pushes not in `pushes`
     pushes: str = ""  # training pushes (`runs.digests`)
@@ -93,7 +93,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def numbers_of_disks(self) -> tuple[int, ...]:
         """The numbers of disks in the pushes of the training data."""
-        return self.counts or (self.disks,)
+        return (self.disks,) if self.counts is msgspec.UNSET else self.counts
 
     @property
     def has_single_steps(self) -> bool:
