@@ -17,12 +17,7 @@ from sainet.engines.simulator import InternalEngine
 from sainet.learning.log import LogLine, append_log, read_log, rewind_log
 from sainet.learning.mixture import Batches, Mixture, Validate
 from sainet.learning.recipes import FROM_ENGINE, FromModel, Recipe, Start
-from sainet.learning.step import (
-    Best,
-    FitState,
-    make_step,
-    trained_layers,
-)
+from sainet.learning.step import Best, FitState, make_step, trained_layers
 from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
@@ -81,7 +76,9 @@ def fit(
 
     Raises:
         RunConflict: the folder contains something else.
-        BadStore: the data lack inputs of the network.
+        BadStore: the data lack inputs of the network, or datasets differ in their
+            setup, time step or engine.
+        BadInput: there is no dataset, or the recipe does not fit the model.
         BadCheckpoint: training cannot start from that network.
         Diverged: the loss became NaN or infinite.
     """
@@ -175,11 +172,8 @@ def _iterate(
     out: Path,
     on_step: Callable[[int, float | None], None],
 ) -> None:
-    recipe, history, total = (
-        mixture.lead.recipe,
-        progress.history,
-        mixture.lead.iterations,
-    )
+    recipe, history = mixture.lead.recipe, progress.history
+    total = mixture.lead.iterations
     batches = Batches(mixture)
     try:
         for iteration in range(int(progress.state.iteration) + 1, total + 1):

@@ -19,6 +19,7 @@ from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import FROM_ENGINE, FromSimulator, Recipe, SingleSteps
 from sainet.models.card import Card
 from sainet.models.checkpoint import features_of, new_network, untrained
+from sainet.models.correctors.contact import ContactNetwork
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.correctors.network import AbstractNetwork, Scales
 from sainet.models.features import AbstractFeatures, FeatureSet, Place
@@ -184,8 +185,9 @@ def first_network(task: Task, scales: Scales) -> AbstractNetwork:
             hold=task.recipe.horizon.hold,
         )
     network = task.existing.network
-    if not isinstance(network, InteractionNetwork):
-        return network
+    if isinstance(network, ContactNetwork):
+        return network.held(task.recipe.horizon.hold)
+    assert isinstance(network, InteractionNetwork)
     return widen(network, scales) if task.features != network.features else network
 
 

@@ -94,7 +94,7 @@ def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
         time_step=card.time_step,
     )
     hold = card.recipe.hold
-    hold = HOLD if hold is msgspec.UNSET else hold
+    hold = 1 if hold is msgspec.UNSET else hold
     network = untrained(features, card.time_step, integrator, hold)
     loaded = load_arrays(folder / WEIGHTS, network)
     if content_hash(read_file(folder / WEIGHTS, error=BadCheckpoint)) != card.weights:

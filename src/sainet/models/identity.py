@@ -23,7 +23,7 @@ _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian proc
 _VARIANTS = {
     "single-steps": "single steps",
     "for-all": "all surfaces",
-    "one-to-four": "one to four disks",
+    "one-to-four": "mixed",  # numbers of disks
 }
 
 
@@ -53,6 +53,8 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
             return self.name
         label = _KINDS[self.kind] + self._engine_label()
         words = filter(None, self._parts()[1:])
+        if self.features == "contact":  # always residuals
+            words = (word for word in words if word != self.data)
         return ", ".join([label, *(_VARIANTS.get(word, word) for word in words)])
 
     def _parts(self) -> list[str]:

@@ -87,6 +87,15 @@ class Table:
         start = sum(each.width for each in before)
         return line.cells[start : start + column.width]
 
+    def present_of(self, line: Line, column: Column) -> tuple[Cell, ...]:
+        """Return the cells of the disks that the line has: others may have more."""
+        every = [self.cells_of(line, each) for each in self.columns if each.bodies]
+        known = [
+            n for cells in every for n, cell in enumerate(cells, 1) if cell.text != DASH
+        ]
+        cells = self.cells_of(line, column)
+        return cells[: max(known, default=len(cells))] if column.bodies else cells
+
     def part(self, keys: Sequence[str]) -> "Table":
         """Return the same lines with some of the columns."""
         kept = tuple(column for column in self.columns if column.key in keys)

@@ -61,13 +61,14 @@ def _drawn(table: Table, *, is_compact: bool) -> RichTable:
     for column in table.columns:
         for heading in _rich_headings(column, is_compact=is_compact):
             drawn.add_column(Text(heading), justify="right", no_wrap=True)
+    cells_of = table.present_of if is_compact else table.cells_of
     for lines, style in ((table.lines, ""), (table.published, "italic")):
         for line in lines:
             names = map(Text, _names(table, line))  # a name may look like markup
             cells = [
                 cell
                 for column in table.columns
-                for cell in _rich_cells(table.cells_of(line, column), is_compact)
+                for cell in _rich_cells(cells_of(line, column), is_compact)
             ]
             drawn.add_row(*names, *cells, style=style)
         drawn.add_section()
@@ -170,7 +171,7 @@ def to_markdown(table: Table) -> str:
             names = [_marked(_plain(name), mark) for name in _names(table, line)]
             rows.append(
                 names
-                + [_markdown(table.cells_of(line, c), mark) for c in table.columns]
+                + [_markdown(table.present_of(line, c), mark) for c in table.columns]
             )
     text = "\n".join("| " + " | ".join(row) + " |" for row in rows)
     below = [f"- {_plain(sentence)}" for sentence in table.sentences]

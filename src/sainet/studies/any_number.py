@@ -6,6 +6,7 @@ radii; the paper's networks are the shipped ones, trained on two disks.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING
 
 from msgspec import structs
@@ -20,14 +21,7 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.studies import Scale
 from sainet.studies.paper_setup import IN, SAIN, physics
-from sainet.studies.steps import (
-    Evaluate,
-    Join,
-    Load,
-    Simulate,
-    Step,
-    Train,
-)
+from sainet.studies.steps import Evaluate, Join, Load, Simulate, Step, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import Arrangement
 
@@ -42,7 +36,7 @@ CONTACTS = ModelId(
 )
 MIXED = structs.replace(CONTACTS, variant="one-to-four")
 TRAINED = (1, 2, 3, 4)  # disks
-TESTED = (2, 3, 5, 8)
+TESTED = (2, 3, 5, 8)  # disks; two have one arrangement
 ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
 GAPS_MM = (-2, -1, 0, 1, 2, 5)
 # Training pushes of each number of disks, test pushes of each condition, iterations.
@@ -113,22 +107,27 @@ def _paper() -> tuple[Step[Model], ...]:
     return (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
 
 
+def _conditions() -> Iterator[tuple[GenerateConfig, Condition]]:
+    """Yield the number and the arrangement of disks; two have one arrangement."""
+    for disks, arrangement in product(TESTED, ARRANGEMENTS):
+        label = f"{disks} disks"
+        if disks > TESTED[0]:
+            label += f", {arrangement}"
+        elif arrangement != ARRANGEMENTS[0]:
+            continue
+        factors: dict[str, float | str] = {"disks": disks, "arrangement": arrangement}
+        config = GenerateConfig(disks=disks, arrangement=arrangement)
+        yield config, Condition(label=label, factors=factors)
+
+
 def _numbers(scope: Scope) -> Plan:
     """Return the errors against the number of disks, in each arrangement."""
     scale = scope.scale
     models = (*_paper(), *of_two(scale), *of_one_to_four(scale))
-    parts = []
-    for disks in TESTED:
-        for arrangement in ARRANGEMENTS if disks > 2 else ("cluster",):  # noqa: PLR2004
-            label = f"{disks} disks" + (f", {arrangement}" if disks > 2 else "")  # noqa: PLR2004
-            config = GenerateConfig(disks=disks, arrangement=arrangement)
-            factors: dict[str, float | str] = {
-                "disks": disks,
-                "arrangement": arrangement,
-            }
-            tests = test_pushes(scale, config, label)
-            named = Condition(label=label, factors=factors)
-            parts.append(Evaluate(models, tests, named))
+    parts = (
+        Evaluate(models, test_pushes(scale, config, named.label), named)
+        for config, named in _conditions()
+    )
     return Plan(Join(tuple(parts)))
 
 
@@ -149,7 +148,7 @@ NUMBERS = Study(
     subject=CONTACTS.slug,
     claims=tuple(
         Claim(
-            f"a contact network trained on two disks errs less than its engine, "
+            "a contact network trained on two disks errs less than its engine, "
             f"{disks} disks",
             errs_less(
                 CONTACTS.slug, "physics-true", condition=f"{disks} disks, cluster"

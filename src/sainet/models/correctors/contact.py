@@ -74,6 +74,12 @@ class ContactNetwork(AbstractNetwork):
         self.time_step = features.time_step
         self.integrator, self.hold = RelaxingResidual(), hold
 
+    def held(self, hold: int) -> "ContactNetwork":
+        """Return the network with another hold (steps)."""
+        other = ContactNetwork(self.features, key=jax.random.key(0), hold=hold)
+        parts = lambda n: (n.rel, n.dyn, n.scales)  # noqa: E731
+        return eqx.tree_at(parts, other, parts(self))
+
     @property
     def unroll(self) -> Callable[..., Array]:
         """The zero-order hold, in training and in prediction alike."""
