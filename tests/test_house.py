@@ -247,6 +247,16 @@ ANY_NUMBER = (
     "learning/mixture",
     "studies/any_number",
 )
+# The whole paper with one command: letter, feedforward networks, many machines, claims.
+WHOLE_PAPER = (
+    "models/correctors/feedforward",
+    "runs/executors",
+    "runs/shards",
+    "studies/conclusions",
+    "studies/feedforward",
+    "studies/letter",
+    "studies/published_physics",
+)
 ENGINEER = (
     "cli/inspect",
     "datasets/doubts",
@@ -275,6 +285,7 @@ LATER = ADDED + modules_of(
     + ENGINEER
     + ENSEMBLES
     + ANY_NUMBER
+    + WHOLE_PAPER
 )
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
@@ -287,6 +298,7 @@ CONNECTIONS = {
     "ensembles": 62,
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
+    "the whole paper": 100,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -346,6 +358,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(ANY_NUMBER))),
         500,
         500,
+    ),
+    "code lines of the whole paper": (
+        lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
+        900,
+        900,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),
