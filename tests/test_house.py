@@ -249,6 +249,8 @@ ANY_NUMBER = (
 )
 # The whole paper with one command: letter, feedforward networks, many machines, claims.
 WHOLE_PAPER = (
+    # With lines that stood in models/features.py before.
+    "models/blocks",
     "models/correctors/feedforward",
     "runs/executors",
     "runs/shards",

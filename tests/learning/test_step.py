@@ -280,6 +280,13 @@ def test_loss_terms_are_scaled_by_the_motion(model):
         assert float(getattr(found, name)) == pytest.approx(wanted, rel=2e-3)
 
 
+def test_the_papers_loss_is_of_squared_metres_and_radians():
+    objective = Objective(terms="metres", weight_spin=3.0)
+    found = loss_weights(batch_of("in"), objective)
+    names = ("position", "rotation", "velocity", "spin")
+    assert [float(getattr(found, name)) for name in names] == [1, 1, 1, 3]
+
+
 def still(arrays):
     """Pushes in which no disk ever turns."""
     truth = arrays["truth"].copy()

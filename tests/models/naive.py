@@ -47,12 +47,12 @@ def nearest_disk(scene, state, push: int) -> int:
     return int(np.argmin(gaps))
 
 
-def local_push(scene, state, controls, push: int) -> LocalPush:
-    """Inputs of the network for one push of a batch."""
+def local_push(scene, state, controls, push: int, *, turns: bool = True) -> LocalPush:
+    """Inputs of the network for one push of a batch, in the push frame if it turns."""
     pushed = nearest_disk(scene, state, push)
     origin = double(state.position[push, pushed])
     normal = origin - double(state.pusher_position[push])
-    angle = np.arctan2(normal[1], normal[0])
+    angle = np.arctan2(normal[1], normal[0]) if turns else 0.0
     local = LocalPush(
         mass=double(scene.mass[push]),
         radius=double(scene.radius[push]),
@@ -125,13 +125,14 @@ def acting_on(local, motion, i: int) -> list[int]:
     return [j for j in others if gaps[j] <= 0.02]
 
 
-def pair_inputs(local, motion, rate_step, i: int, j: int) -> np.ndarray:
+def pair_inputs(local, motion, rate_step, i: int, j: int, *, poses: bool) -> np.ndarray:
     """Inputs of f_rel for a pair (eq. 4; with the simulator eq. 9)."""
+    numbers = 3 if poses else 2  # of p_i - p_j: with the angle, or without
     return np.concatenate(
         [
             motion[i, 3:6],
             [] if rate_step is None else rate_step[i],
-            motion[i, 0:2] - motion[j, 0:2],
+            motion[i, :numbers] - motion[j, :numbers],
             motion[i, 3:6] - motion[j, 3:6],
             [local.mass[i], local.radius[i], local.mass[j], local.radius[j]],
         ]
@@ -180,19 +181,22 @@ def bounded(x, mean, deviation) -> np.ndarray:
 
 def accelerations(network, local, motion, simulated_step, step: int) -> np.ndarray:
     scales, bodies = network.scales, range(len(motion))
+    scaled = network.features.are_standardised
     pose_step = None if simulated_step is None else simulated_step[:, :3]
     rate_step = None if simulated_step is None else simulated_step[:, 3:]
     found = []
     for i in bodies:
         effect = np.zeros(16)
         for j in acting_on(local, motion, i):
-            seen = pair_inputs(local, motion, rate_step, i, j)
-            seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
+            seen = pair_inputs(local, motion, rate_step, i, j, poses=not scaled)
+            if scaled:
+                seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
             effect += layers(network.rel, seen)
         seen = body_inputs(local, motion, pose_step, step, i)
         if network.features.has_place:
             seen = np.concatenate([seen, place_inputs(local, motion, i)])
-        seen = bounded(seen, scales.body_mean, scales.body_deviation)
+        if scaled:
+            seen = bounded(seen, scales.body_mean, scales.body_deviation)
         out = layers(network.dyn, np.concatenate([seen, effect]))
         found.append(out * double(scales.acceleration))
     return np.array(found)
@@ -204,7 +208,8 @@ def rollout(network, push_batch, simulated, push: int) -> np.ndarray:
     `push_batch` is the scenes, the initial states and the controls.
     `simulated` is s-bar after each step, ``[push, time, body, 6]``; None for IN.
     """
-    local = local_push(*push_batch, push)
+    turns = not network.features.has_table_axes
+    local = local_push(*push_batch, push, turns=turns)
     motion = before = local.start
     path = []
     for step in range(len(local.action)):

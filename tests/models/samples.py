@@ -54,11 +54,11 @@ def network(
     kind: str,
     seed: int = 0,
     *,
-    place: bool = False,
+    name: str = "paper",
     residual: bool = False,
 ) -> InteractionNetwork:
     """An untrained network with scales that matter and effects that are large."""
-    features = feature_set(kind, simulator=model == "sain", place=place)
+    features = feature_set(kind, simulator=model == "sain", name=name)
     rng = np.random.default_rng(seed)
 
     def drawn(low, high, size):

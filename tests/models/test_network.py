@@ -119,12 +119,13 @@ def test_an_untrained_additive_network_equals_the_engine(kind):
     np.testing.assert_allclose(found[..., 3:], wanted[..., 3:], atol=2e-4)
 
 
+@pytest.mark.parametrize("name", ["place", "letter", "letter-push-frame"])
 @every_kind
 @every_model
-def test_a_network_with_table_features_equals_the_loop(model, kind):
+def test_a_network_with_other_features_equals_the_loop(model, kind, name):
     batch = moving_pushes(kind, 2)
     made = quick_dynamics(model, kind)
-    seeing = network(model, kind, place=True)
+    seeing = network(model, kind, name=name)
     made = eqx.tree_at(lambda d: d.network, made, seeing)
     found = np.asarray(pack_motion(predict(made, *batch).states))
     simulated = None
@@ -139,9 +140,9 @@ def test_a_network_with_table_features_equals_the_loop(model, kind):
 def test_a_widened_network_makes_the_same_predictions(model):
     batch = moving_pushes("robot", 2)
     made = quick_dynamics(model, "robot")
-    scales = network(model, "robot", seed=3, place=True).scales
+    scales = network(model, "robot", seed=3, name="place").scales
     wide = eqx.tree_at(lambda d: d.network, made, widen(made.network, scales))
-    assert wide.network.features == network(model, "robot", place=True).features
+    assert wide.network.features == network(model, "robot", name="place").features
     plain, found = (predict(d, *batch).states for d in (made, wide))
     np.testing.assert_allclose(found.position, plain.position, atol=1e-7)
     np.testing.assert_allclose(found.angle, plain.angle, atol=1e-6)

@@ -92,6 +92,7 @@ def store_info(config: GenerateConfig) -> StoreInfo:
         assumed_engines=tuple(spec.stored_as for spec in specs),
         has_measurements=True,
         seed=config.seed,
+        damping=config.damping_n_s_m,
     )
 
 

@@ -205,6 +205,8 @@ def loss_weights(batch: PushBatch, objective: Objective) -> LossWeights:
     was observed: training is to reduce errors, and where only the end of a push is
     known, position and rotation would otherwise have very unequal weights.
     """
+    if objective.terms == "metres":
+        return _in_metres(objective)
     by_motion = objective.terms == "motion"
     pose, rate = _motion(batch) if by_motion else _errors(batch)
     place = jnp.nanmean(jnp.sum(pose[..., 0:2] ** 2, axis=-1))
@@ -215,6 +217,20 @@ def loss_weights(batch: PushBatch, objective: Objective) -> LossWeights:
         rotation=objective.weight_rotation / _nonzero(turn),
         velocity=objective.weight_velocity / _nonzero(velocity),
         spin=objective.weight_spin / _nonzero(jnp.nanmean(rate[..., 2] ** 2)),
+        linear_from=objective.linear_from,
+    )
+
+
+def _in_metres(objective: Objective) -> LossWeights:
+    """Return the weights of the paper's loss: of squared m, m/s and rad/s as they are.
+
+    The paper writes the velocity of a pose, with its spin.
+    """
+    return LossWeights(
+        position=jnp.float32(objective.weight_position),
+        rotation=jnp.float32(objective.weight_rotation),
+        velocity=jnp.float32(objective.weight_velocity),
+        spin=jnp.float32(objective.weight_spin),
         linear_from=objective.linear_from,
     )
 

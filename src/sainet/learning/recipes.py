@@ -14,7 +14,7 @@ from sainet.models.card import TrainingSettings
 from sainet.models.identity import Features
 from sainet.runs.errors import require, unknown_name
 
-Terms = Literal["motion", "error"]
+Terms = Literal["motion", "error", "metres"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
 
 
@@ -71,7 +71,8 @@ class Objective:
     """Weight of spins in the scaled loss."""
     terms: Terms = "motion"
     """Scale of the terms of the loss. motion: the mean squared motion in the data.
-    error: the mean squared error of the simulator prediction."""
+    error: the mean squared error of the simulator prediction. metres: none, as in the
+    paper's loss, in SI units."""
     linear_from: float = 0.0
     """Scaled error of a push above which the loss grows linearly, no longer squared, so
     that failed recordings do not dominate; 0: squared everywhere."""
@@ -188,7 +189,9 @@ class Recipe:
     features: Features = "paper"
     """Features of the network. place: the place on the table and the absolute angle
     too, with which the friction of a real surface varies. contact: those of each
-    contact in its own frame, for any number of disks (only around an engine)."""
+    contact in its own frame, for any number of disks (only around an engine). letter:
+    those of the paper's equations in SI units, along the axes of the table.
+    letter-push-frame: the same in the push frame."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""

@@ -17,12 +17,13 @@ from sainet.engines.simulator import InternalEngine
 from sainet.learning.batches import mirror_some, to_single_steps
 from sainet.learning.loss import LossWeights, feature_scales, loss_weights
 from sainet.learning.recipes import FROM_ENGINE, FromSimulator, Recipe, SingleSteps
+from sainet.models.blocks import Place
 from sainet.models.card import Card
 from sainet.models.checkpoint import features_of, new_network, untrained
 from sainet.models.correctors.contact import ContactNetwork
 from sainet.models.correctors.interaction import InteractionNetwork
-from sainet.models.correctors.network import AbstractNetwork, Scales
-from sainet.models.features import AbstractFeatures, FeatureSet, Place
+from sainet.models.correctors.network import AbstractNetwork, Scales, unit_scales
+from sainet.models.features import AbstractFeatures, FeatureSet
 from sainet.models.identity import ModelKind
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 
@@ -169,7 +170,12 @@ def statistics(task: Task) -> tuple[Scales, LossWeights]:
     store = task.training
     few = slice(0, min(_STATISTICS_PUSHES, store.info.pushes))
     sample = task.to_sample(store.read(few, task.names))
-    scales = feature_scales(sample, task.features, task.integrator)
+    features = task.features
+    scales = (
+        feature_scales(sample, features, task.integrator)
+        if features.are_standardised
+        else unit_scales(features)
+    )
     return scales, loss_weights(sample, task.recipe.objective)
 
 

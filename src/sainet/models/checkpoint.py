@@ -118,7 +118,7 @@ def features_of(
     """
     if name == "contact":
         return ContactFeatures(time_step)
-    return feature_set(setup, simulator=simulator, place=name == "place")
+    return feature_set(setup, simulator=simulator, name=name)
 
 
 def new_network(

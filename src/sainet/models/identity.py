@@ -13,9 +13,20 @@ Kind = Literal["physics", "in", "sain", "gp", "published"]
 TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
 ModelKind = Literal["in", "sain"]  # of networks
 # "contact" is the form of contact networks, beyond the paper.
-Features = Literal["paper", "place", "contact"]
+# "letter" takes the inputs of the paper's equations as they are, see `models.features`.
+Features = Literal["paper", "place", "contact", "letter", "letter-push-frame"]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
-Variant = Literal["", "bystander", "single-steps", "for-all", "ensemble", "one-to-four"]
+Variant = Literal[
+    "",
+    "bystander",
+    "single-steps",
+    "for-all",
+    "ensemble",
+    "one-to-four",
+    "loss-in-metres",
+    "large-l2",
+    "small-l2",
+]
 
 NETWORKS = get_args(ModelKind)
 LEARNED = (*NETWORKS, "gp")
@@ -24,6 +35,11 @@ _VARIANTS = {
     "single-steps": "single steps",
     "for-all": "all surfaces",
     "one-to-four": "mixed",  # numbers of disks
+    "letter": "by the letter",
+    "letter-push-frame": "by the letter but in the push frame",
+    "loss-in-metres": "loss in metres",
+    "large-l2": "large l2",
+    "small-l2": "small l2",
 }
 
 

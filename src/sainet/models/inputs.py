@@ -26,6 +26,10 @@ class PushFrame(eqx.Module):
     angle: Float[Array, "*batch"]  # rad, of the contact normal
     pushed: Float[Array, "*batch body"]  # 1 for the pushed disk, 0 for the others
 
+    def along_table(self) -> "PushFrame":
+        """Return the frame with the same origin and the axes of the table."""
+        return PushFrame(self.origin, jnp.zeros_like(self.angle), self.pushed)
+
 
 def push_frame(scene: Scene, state: State) -> PushFrame:
     """Return the frame of the pushed disk, the disk nearest to the pusher's surface."""

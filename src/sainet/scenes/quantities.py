@@ -101,6 +101,8 @@ FORCE = Quantity("force", "N", -1e4, 1e4)
 PUSHING_FORCE = Quantity("pushing force", "N", 1e-6, 1e4)
 PUSHER_MASS = Quantity("pusher mass", "kg", 1e-3, 1e4, "grams")
 DAMPING = Quantity("damping", "N s/m", 0.0, 1e6)
+# Of a pusher of 10 kg, whose explicit steps diverge from 2,400 N s/m on.
+STABLE_DAMPING = Quantity("damping", "N s/m", 0.0, 2000.0)
 STROKE = Quantity("stroke", "m", 1e-4, 1.0, "millimetres")
 SPEED = Quantity("speed", "m/s", 1e-4, 10.0, "mm/s")
 ALIGNMENT = Quantity("alignment weight", "m", 0.0, 1e4)

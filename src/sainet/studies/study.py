@@ -49,6 +49,9 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         found: dict[str, str] = {}
         if self.l2 is not None:
             found["l2"] = f"{self.l2:g}"
+        if self.start is None and self.change:
+            words = (f"{k.replace('_', ' ')} {v}" for k, v in self.change.items())
+            found["setting"] = ", ".join(words)
         if self.start is not None:
             changes = (self.change or {}).items()
             words = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in changes)

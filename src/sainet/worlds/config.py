@@ -30,6 +30,7 @@ _RANGES = {
 _QUANTITIES = {
     "pusher_radius_mm": quantities.PUSHER_RADIUS.times(1000, "mm"),
     "force_n": quantities.PUSHING_FORCE,
+    "damping_n_s_m": quantities.STABLE_DAMPING,
     "gap_mm": quantities.START_GAP.times(1000, "mm"),
 }
 
@@ -76,6 +77,8 @@ class WorldConfig:
     defaults, is rounded up to a multiple of 40."""
     force_n: float = 8.0
     """Force on the pusher (N; direct force)."""
+    damping_n_s_m: float = 1000.0
+    """Viscous damping of the pusher (N s/m; direct force)."""
     force_steps: int = 480
     """Number of steps with force (direct force), 1/240 s each."""
     noise_level: NoiseLevel = "default"

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -91,8 +91,10 @@ class ForceSetup(AbstractSetup):
         self, scene: Scene, state: State, push: Push, steps: int
     ) -> tuple[State, Controls]:
         """Command the force along the push direction."""
-        force, gap = self.config.force_n, self._gap
-        return command_force(scene, state, push, force=force, steps=steps, gap=gap)
+        initial, controls = command_force(
+            scene, state, push, force=self.config.force_n, steps=steps, gap=self._gap
+        )
+        return initial, replace(controls, damping=self.config.damping_n_s_m)
 
     def error(
         self, controls: Controls, noise: NoiseConfig, rng: Generator, time_step: float

@@ -68,13 +68,18 @@ class InteractionNetwork(AbstractNetwork):
 
     def acceleration(self, moment: Moment) -> Float[Array, "3 body push"]:
         """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 5 and 10)."""
-        inputs = standardise(
+        inputs = self._scaled(
             self.features.of_bodies(moment),
             self.scales.body_mean,
             self.scales.body_deviation,
         )
         out = self.dyn(jnp.concatenate([inputs, self._effects(moment)]))
         return out * like(self.scales.acceleration, out)
+
+    def _scaled(self, inputs: Array, mean: Array, deviation: Array) -> Array:
+        if not self.features.are_standardised:
+            return inputs
+        return standardise(inputs, mean, deviation)
 
     def _effects(self, moment: Moment) -> Float[Array, "effect body push"]:
         """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j).
@@ -87,7 +92,7 @@ class InteractionNetwork(AbstractNetwork):
         others = bodies - 1
         if not others:
             return jnp.zeros((EFFECT, bodies, pushes), moment.motion.dtype)
-        inputs = standardise(
+        inputs = self._scaled(
             self.features.of_pairs(moment),
             self.scales.pair_mean,
             self.scales.pair_deviation,

@@ -150,7 +150,7 @@ class AbstractNetwork(AbstractCorrector):
             simulated: packed s-bar after each step, in the table frame; None for IN.
             unroll: instead of the network's own, the zero-order hold of training.
         """
-        frame = start.frame
+        frame = self.features.axes(start.frame)
         initial = motion_to_frame(pack_motion(start.predicted), frame)
         before, path = initial, None
         if simulated is not None:
@@ -161,7 +161,12 @@ class AbstractNetwork(AbstractCorrector):
             before = motion_to_frame(pack_motion(start.simulated), frame)
         drive = drives(controls.in_frame(frame.origin, frame.angle), before, path)
         still = still_features(scene, frame)
-        return (unroll or self.unroll)(self, initial, still, drive, before=before)
+        found = (unroll or self.unroll)(self, initial, still, drive, before=before)
+        if frame is start.frame:
+            return found
+        return jax.vmap(
+            lambda now: motion_to_frame(motion_from_frame(now, frame), start.frame)
+        )(found)
 
 
 def silenced(layers: Layers) -> Layers:
