@@ -85,12 +85,17 @@ class FeatureSet(AbstractFeatures):
     """The inputs of a network: blocks in the order of its weights."""
 
     blocks: tuple[Block, ...]
-    are_standardised: bool = True
+    has_si_units: bool = False  # or inputs that the training data scale
     has_table_axes: bool = False  # or those of the push frame
 
     def axes(self, frame: PushFrame) -> PushFrame:
         """Return the frame in which the network sees a push."""
         return frame.along_table() if self.has_table_axes else frame
+
+    @property
+    def are_standardised(self) -> bool:
+        """Whether the inputs and outputs are scaled by the training data."""
+        return not self.has_si_units
 
     @property
     def pair_size(self) -> int:
@@ -159,6 +164,6 @@ def feature_set(kind: str, *, simulator: bool, name: str = "paper") -> FeatureSe
     blocks = (Motion(), *optional, relative, ACTIONS[kind], Properties())
     return FeatureSet(
         (*blocks, Place()) if name == "place" else blocks,
-        are_standardised=not by_letter,
+        has_si_units=by_letter,
         has_table_axes=name == LETTER,
     )
