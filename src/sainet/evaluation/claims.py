@@ -26,11 +26,16 @@ class Verdict:
         status: the ruling.
         comparisons: all comparisons that it rests on.
         contradicting: those of them that contradict the claim.
+        p: two-sided, that chance alone makes the claim hold; None: the rule has none.
     """
 
     status: Status
     comparisons: tuple[Comparison, ...] = ()
     contradicting: tuple[Comparison, ...] = ()
+    p: float | None = None
+
+
+Rule = Callable[[Summary], Verdict]
 
 
 @dataclass(frozen=True)
@@ -38,7 +43,7 @@ class Claim:
     """A sentence that is true or false, and the rule that decides."""
 
     text: str
-    rule: Callable[[Summary], Verdict]
+    rule: Rule
 
 
 def keeps_published_order(summary: Summary) -> Verdict:
@@ -77,7 +82,7 @@ def errs_less(
     *,
     condition: str = "",
     metrics: Sequence[str] = ("pos_mm", "rot_deg"),
-) -> Callable[[Summary], Verdict]:
+) -> Rule:
     """Return the rule that a model errs less: every interval lies below zero."""
 
     def rule(summary: Summary) -> Verdict:
@@ -86,14 +91,14 @@ def errs_less(
         if not found or any(each.difference.low is None for each in found):
             return Verdict("not testable here", found)
         wrong = tuple(each for each in found if sign(each) >= 0)
-        return Verdict("does not hold" if wrong else "holds", found, wrong)
+        # All must hold: the least certain one decides (an intersection-union test).
+        p = None if wrong else max(each.p or 0.0 for each in found)
+        return Verdict("does not hold" if wrong else "holds", found, wrong, p)
 
     return rule
 
 
-def solves_more(
-    model: str, against: str, condition: str
-) -> Callable[[Summary], Verdict]:
+def solves_more(model: str, against: str, condition: str) -> Rule:
     """Return the rule that a model solves more goals, by more than chance."""
 
     def rule(summary: Summary) -> Verdict:
@@ -102,8 +107,14 @@ def solves_more(
             return Verdict("not testable here")
         found = rank_models(summary, condition).better
         better = {row.model: others for row, others in found}
-        holds = against in (row.model for row in better.get(model, ()))
-        return Verdict("holds" if holds else "does not hold")
+        if against not in (row.model for row in better.get(model, ())):
+            return Verdict("does not hold")
+        (p,) = (
+            test.p
+            for test in _tests_of_solved(summary, condition)
+            if {test.model, test.against} == {model, against}
+        )
+        return Verdict("holds", p=p)
 
     return rule
 

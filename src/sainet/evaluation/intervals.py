@@ -102,6 +102,18 @@ class Sample:
         """Return the differences of the means over the same pushes."""
         return self._interval(self.mean - other.mean, self.drawn() - other.drawn(1))
 
+    def chance(self, other: "Sample") -> Float[np.ndarray, " quantity"]:
+        """Return p, two-sided, of differences of the means over the same pushes.
+
+        Twice the share of resamples on the other side of zero, of at least one: below
+        0.05 where the interval of `minus` leaves out zero.
+        """
+        value = self.mean - other.mean
+        drawn = value + self._widening * (self.drawn() - other.drawn(1) - value)
+        beyond = np.minimum((drawn >= 0).sum(axis=0), (drawn <= 0).sum(axis=0))
+        p = np.minimum(2 * (beyond + 1) / (RESAMPLES + 1), 1.0)
+        return np.where(np.isnan(drawn).any(axis=0), np.nan, p)
+
     def over(self, other: "Sample", *, trained_apart: bool = False) -> Interval:
         """Return the ratios of the means over the same pushes.
 
@@ -168,11 +180,11 @@ class Estimate(msgspec.Struct, frozen=True):
 
 def estimate(found: Interval, body: int, *, with_interval: bool = True) -> Estimate:
     """Return one of several numbers with its interval."""
-    value, low, high = (_number(float(part[body])) for part in found)
+    value, low, high = (known(float(part[body])) for part in found)
     return Estimate(value, low, high) if with_interval else Estimate(value)
 
 
-def _number(value: float) -> float | None:
+def known(value: float) -> float | None:
     """Return a number that JSON can hold; None where it is unknown."""
     return float(value) if math.isfinite(value) else None
 

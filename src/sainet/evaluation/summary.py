@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from sainet.evaluation import measurements
-from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
+from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of, known
 from sainet.evaluation.lab_outcomes import (
     TrialDifference,
     TrialOutcome,
@@ -39,6 +39,7 @@ class Comparison(msgspec.Struct, frozen=True, kw_only=True):
     body: int
     metric: str
     difference: Estimate
+    p: float | None = None  # two-sided, that chance alone makes such a difference
 
 
 class Factor(msgspec.Struct, frozen=True, kw_only=True):
@@ -228,6 +229,7 @@ class _Part:
         one, other = self.models[model].samples, self.models[against].samples
         for metric in MEASURED:
             found = one[metric].minus(other[metric])
+            chance = one[metric].chance(other[metric])
             if not np.isfinite(found[0]).any():
                 continue  # not measured for either
             for body in range(self.bodies):
@@ -238,6 +240,7 @@ class _Part:
                     body=body + 1,
                     metric=metric,
                     difference=estimate(found, body),
+                    p=known(float(chance[body])),
                 )
 
     def factors(self) -> Iterator[Factor]:

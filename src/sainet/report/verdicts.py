@@ -13,6 +13,7 @@ from sainet.evaluation.claims import (
     sign,
 )
 from sainet.evaluation.metrics import METRICS
+from sainet.evaluation.rulings import rule_on
 from sainet.evaluation.summary import BASELINE, Comparison, Summary
 from sainet.evaluation.trials import TrialTest
 from sainet.report.pages import render_text
@@ -42,17 +43,15 @@ def verdicts_on(summary: Summary) -> tuple[str, ...]:
 def rulings(claims: Sequence[Claim], summary: Summary) -> tuple[str, ...]:
     """Return each claim with its verdict, and the comparisons that contradict it."""
     labels, found = labels_of(summary.models), []
-    for claim in claims:
-        verdict = claim.rule(summary)
+    for ruled in rule_on(claims, summary):
         pairs: dict[tuple[str, str], list[Comparison]] = {}
-        for each in verdict.contradicting:
+        for each in ruled.contradicting:
             pairs.setdefault((each.model, each.against), []).append(each)
         wrong = [
             (*pair, _where(e), _where([each for each in e if sign(each)]))
             for pair, e in pairs.items()
         ]
-        text = {"labels": labels, "claim": claim, "wrong": wrong}
-        found.append(_worded("claim", status=verdict.status, **text))
+        found.append(_worded("claim", labels=labels, ruled=ruled, wrong=wrong))
     return tuple(found)
 
 

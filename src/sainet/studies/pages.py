@@ -17,6 +17,7 @@ import jinja2
 
 from sainet.evaluation.claims import places
 from sainet.evaluation.coverage import HEADINGS, rows_of
+from sainet.evaluation.rulings import rule_on
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
 from sainet.report.palette import labels_of
@@ -130,14 +131,15 @@ def findings(evidence: Evidence, titles: Mapping[str, str]) -> str:
         evidence: of the studies.
         titles: of pages, by the names of their templates.
     """
-    rows: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, ...]] = []
     for name in STUDIES:
         claims = load_study(name).claims if name in titles else ()
         summary = evidence.summary(name) if claims else Summary(models=())
-        for claim in claims:
-            status = claim.rule(summary).status
-            rows.append((claim.text, f"**{status}**", f"[{titles[name]}]({name}.md)"))
-    return _table(("claim", "verdict", "page"), rows, align=":--")
+        page = f"[{titles[name]}]({name}.md)" if claims else ""
+        for each in rule_on(claims, summary):
+            p = "" if each.p is None else f"{each.p:.3f}"
+            rows.append((each.claim.text, f"**{each.status}**", p, page))
+    return _table(("claim", "verdict", "p", "page"), rows, align=":--")
 
 
 def _table(

@@ -12,6 +12,7 @@ from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.claims import Claim
 from sainet.evaluation.evaluate import EndOffsets
 from sainet.evaluation.measurements import Measurements, PublishedValues
+from sainet.evaluation.rulings import rule_on
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.report.figures.engine_errors import draw_engine_errors
@@ -66,6 +67,7 @@ class Ruling(msgspec.Struct, frozen=True):
 
     claim: str
     status: str
+    p: float | None = None  # as of `evaluation.rulings.Ruled`
 
 
 class Result(msgspec.Struct, frozen=True, kw_only=True):
@@ -195,7 +197,8 @@ class Study:
             as_trained=as_trained,
             choices=self.choose(summary),
             claims=tuple(
-                Ruling(claim.text, claim.rule(summary).status) for claim in self.claims
+                Ruling(each.claim.text, each.status, each.p)
+                for each in rule_on(self.claims, summary)
             ),
         )
         if self.figure is not None:
