@@ -250,12 +250,15 @@ ANY_NUMBER = (
 # The whole paper with one command: letter, feedforward networks, many machines, claims.
 WHOLE_PAPER = (
     "models/correctors/feedforward",
+    "models/nominal",
     "runs/executors",
     "runs/shards",
     "studies/conclusions",
     "studies/feedforward",
     "studies/letter",
+    "studies/properties",
     "studies/published_physics",
+    "studies/reduced_setup",
 )
 ENGINEER = (
     "cli/inspect",

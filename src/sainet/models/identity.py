@@ -12,18 +12,26 @@ Kind = Literal["physics", "in", "sain", "gp", "published"]
 # pushes; "residual" an additive network and "real" a new one, recorded pushes only.
 TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
 ModelKind = Literal["in", "sain"]  # of networks
-# "contact" is the form of contact networks, beyond the paper.
-Features = Literal["paper", "place", "contact"]
+# "contact" is the form of contact networks, beyond the paper, "whole-state" that of
+# feedforward networks; "nominal": the paper's, of assumed masses and radii.
+Features = Literal["paper", "place", "contact", "whole-state", "nominal"]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
-Variant = Literal["", "bystander", "single-steps", "for-all", "ensemble", "one-to-four"]
+Variant = (
+    Literal["", "bystander", "single-steps", "for-all", "ensemble", "one-to-four"]
+    | Literal["three-disks", "fixed-properties"]  # of training pushes
+)
 
 NETWORKS = get_args(ModelKind)
 LEARNED = (*NETWORKS, "gp")
 _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
+_FEEDFORWARD = {"in": "Feedforward", "sain": "SA feedforward"}
 _VARIANTS = {
     "single-steps": "single steps",
     "for-all": "all surfaces",
     "one-to-four": "mixed",  # numbers of disks
+    "three-disks": "3 disks",
+    "fixed-properties": "fixed properties",
+    "nominal": "nominal inputs",
 }
 
 
@@ -51,10 +59,12 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
         """The name for readers."""
         if self.name:
             return self.name
-        label = _KINDS[self.kind] + self._engine_label()
-        words = filter(None, self._parts()[1:])
+        kinds, words = _KINDS, filter(None, self._parts()[1:])
         if self.features == "contact":  # always residuals
             words = (word for word in words if word != self.data)
+        if self.features == "whole-state":
+            kinds, words = _FEEDFORWARD, (w for w in words if w != self.features)
+        label = kinds[self.kind] + self._engine_label()
         return ", ".join([label, *(_VARIANTS.get(word, word) for word in words)])
 
     def _parts(self) -> list[str]:
