@@ -27,7 +27,8 @@ class Reproduce:
     studies: Positional[tuple[str, ...]] = ()
     """Studies: direct-force-two-disks (the paper's Table I), direct-force-three-disks
     (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
-    regularisation and robustness, with the networks of Table III; simulated-control and
+    regularisation and robustness, with the networks of Table III; feedforward,
+    varied-or-fixed and crossed-properties, at reduced size; simulated-control and
     adaptation, with shipped networks; any-number and gaps; expected-cost; robot-planar;
     engine-parity; pretrained (the shipped networks); fine-tuning (settings chosen on
     simulated pushes); recorded-pushes, recorded-trust, recorded-few, recorded-active,
