@@ -249,6 +249,7 @@ ANY_NUMBER = (
 )
 # The whole paper with one command: letter, feedforward networks, many machines, claims.
 WHOLE_PAPER = (
+    "datasets/fixed",
     "models/correctors/feedforward",
     "models/nominal",
     "runs/executors",

@@ -4,18 +4,10 @@ from dataclasses import dataclass
 from typing import get_args
 
 from sainet.engines import ENGINES
-from sainet.engines.simulator import PAPER, SIMULATORS
+from sainet.engines.simulator import SIMULATORS
 from sainet.runs.errors import require, require_one_of
-from sainet.scenes.quantities import (
-    LARGEST_COUNT,
-    MASS,
-    MOST_PUSHES,
-    RADIUS,
-    require_count,
-)
-from sainet.worlds.config import OfDisks, Range, SetupName, WorldConfig
-
-_MM = RADIUS.times(1000, "mm")
+from sainet.scenes.quantities import LARGEST_COUNT, MOST_PUSHES, require_count
+from sainet.worlds.config import SetupName, WorldConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,38 +49,3 @@ class GenerateConfig(WorldConfig):
         for name in ("pushes", "chunk_size"):
             require_count(name, getattr(self, name), high=MOST_PUSHES)
         require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
-
-
-@dataclass(frozen=True, kw_only=True)
-class FixedConfig(GenerateConfig):
-    """Simulated pushes of the same disks every time: those that engines assume."""
-
-    mass_of_each_kg: tuple[float, ...] = PAPER.mass or ()
-    """Mass of each disk (kg)."""
-    radius_of_each_mm: tuple[float, ...] = tuple(1000 * r for r in PAPER.radius or ())
-    """Radius of each disk (mm)."""
-    table_friction: Range = (PAPER.table_friction or 0.0,)
-    """Friction coefficient between disks and table."""
-
-    def __post_init__(self) -> None:
-        """Check every setting.
-
-        Raises:
-            BadSetting: a value is out of its range, or there is not one for each disk.
-        """
-        super().__post_init__()
-        for name, quantity in (("mass_of_each_kg", MASS), ("radius_of_each_mm", _MM)):
-            values = getattr(self, name)
-            wanted = f"{self.disks} numbers"
-            require(len(values) == self.disks, name, wanted, values)
-            quantity.require(name, values)
-
-    @property
-    def masses(self) -> OfDisks:
-        """The mass of each disk (kg)."""
-        return (self.mass_of_each_kg,)
-
-    @property
-    def radii(self) -> OfDisks:
-        """The radius of each disk (mm)."""
-        return (self.radius_of_each_mm,)

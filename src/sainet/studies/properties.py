@@ -7,7 +7,7 @@ assumed masses and radii in the place of the true ones.
 
 from msgspec import structs
 
-from sainet.datasets.config import FixedConfig
+from sainet.datasets.fixed import FixedConfig
 from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
