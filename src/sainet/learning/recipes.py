@@ -188,7 +188,9 @@ class Recipe:
     features: Features = "paper"
     """Features of the network. place: the place on the table and the absolute angle
     too, with which the friction of a real surface varies. contact: those of each
-    contact in its own frame, for any number of disks (only around an engine)."""
+    contact in its own frame, for any number of disks (only around an engine).
+    whole-state: a feedforward network, for as many disks as the training pushes have.
+    nominal: the paper's, of assumed masses and radii."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""
