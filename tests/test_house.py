@@ -251,13 +251,18 @@ ANY_NUMBER = (
 WHOLE_PAPER = (
     # With lines that stood in models/features.py before.
     "models/blocks",
+    "datasets/fixed",
     "models/correctors/feedforward",
+    "models/nominal",
+    "evaluation/rulings",
     "runs/executors",
     "runs/shards",
     "studies/conclusions",
     "studies/feedforward",
     "studies/letter",
+    "studies/properties",
     "studies/published_physics",
+    "studies/reduced_setup",
 )
 ENGINEER = (
     "cli/inspect",
@@ -300,7 +305,7 @@ CONNECTIONS = {
     "ensembles": 62,
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
-    "the whole paper": 100,
+    "the whole paper": 200,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {

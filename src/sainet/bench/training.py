@@ -140,7 +140,7 @@ def save_problem(path: Path, problem: Problem) -> Path:
     network, weights = problem.state.network, problem.weights
     optimiser = problem.recipe.optimiser
     arrays = _batch_arrays(problem)
-    for name, layers in (("rel", network.rel), ("dyn", network.dyn)):
+    for name, layers in zip(("rel", "dyn"), network.trained, strict=True):
         for index, weight in enumerate(layers.weights):
             arrays[f"{name}_weight_{index}"] = weight
             arrays[f"{name}_bias_{index}"] = layers.biases[index]
@@ -262,7 +262,8 @@ def counted_gflop(
     ordered pair of bodies, f_dyn one for each body.
     """
     pairs = bodies * (bodies - 1)
-    row = 2 * (pairs * _weights(network.rel) + bodies * _weights(network.dyn))
+    rel, dyn = network.trained
+    row = 2 * (pairs * _weights(rel) + bodies * _weights(dyn))
     return _FORWARD_AND_BACK * row * pushes * steps / 1e9
 
 

@@ -64,16 +64,7 @@ class AssumedProperties(AbstractEngine):
 
     def assume(self, scene: Scene) -> Scene:
         """Return the scene with the assumed properties."""
-        assumed = self.assumptions
-        return Scene(
-            mass=_replace(scene.mass, assumed.mass),
-            radius=_replace(scene.radius, assumed.radius),
-            table_friction=_fill(scene.table_friction, assumed.table_friction),
-            disk_friction=_fill(scene.disk_friction, assumed.disk_friction),
-            pusher_friction=_fill(scene.pusher_friction, assumed.pusher_friction),
-            pusher_radius=scene.pusher_radius,
-            time_step=scene.time_step,
-        )
+        return with_assumptions(scene, self.assumptions)
 
     @property
     def on_host(self) -> bool:
@@ -88,6 +79,19 @@ class AssumedProperties(AbstractEngine):
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Roll the wrapped engine out in the assumed scene."""
         return self.engine.rollout(self.assume(scene), initial, controls)
+
+
+def with_assumptions(scene: Scene, assumed: Assumptions) -> Scene:
+    """Return a scene with assumed properties, without a friction field."""
+    return Scene(
+        mass=_replace(scene.mass, assumed.mass),
+        radius=_replace(scene.radius, assumed.radius),
+        table_friction=_fill(scene.table_friction, assumed.table_friction),
+        disk_friction=_fill(scene.disk_friction, assumed.disk_friction),
+        pusher_friction=_fill(scene.pusher_friction, assumed.pusher_friction),
+        pusher_radius=scene.pusher_radius,
+        time_step=scene.time_step,
+    )
 
 
 def _fill(true: Array, assumed: float | None) -> Array:

@@ -55,7 +55,13 @@ def evaluate(
     fitted = any(model.card or model.identified for model in models)
     hashes = store.push_hashes() if fitted and not force else None
     for model in () if force else models:
-        model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
+        model.check_fits(
+            info.kind,
+            info.time_step,
+            disks=info.bodies,
+            seed=info.seed,
+            pushes=hashes,
+        )
     pushes = _Pushes(store, _limit(store, steps))
     errors = [_errors(model, pushes, on_pushes) for model in models]
     return _measurements(models, pushes, errors)

@@ -67,6 +67,7 @@ def _check_existing(task: Task, existing: Existing) -> None:
                 "`start` another network."
             )
     _check_internal_engine(task, existing)
+    existing.network.made_for.check_disks(info.bodies, str(path))
     given, wanted = card.identity.features, task.recipe.features
     if given != wanted and (given, wanted) != ("paper", "place"):
         raise BadCheckpoint(

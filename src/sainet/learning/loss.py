@@ -19,7 +19,6 @@ from sainet.models.inputs import (
     in_columns,
     motion_to_frame,
     push_frame,
-    still_features,
 )
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.scenes.state import pack_motion
@@ -146,7 +145,7 @@ def feature_scales(
         simulated = jnp.moveaxis(path_to_frame(batch.simulated, frame), 0, 1)
     drive = drives(batch.controls.in_frame(frame.origin, frame.angle), start, simulated)
     drive = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    still = in_columns(still_features(batch.scene, frame))
+    still = in_columns(features.still(batch.scene, frame))
     columns = jax.vmap(in_columns)((before, drive))
 
     def spread(inputs: Columns, weights: Weights, signs: Signs) -> tuple[Array, Array]:
@@ -159,7 +158,7 @@ def feature_scales(
     body_mean, body_deviation = spread(
         features.of_bodies, features.body_weights, features.body_signs
     )
-    if batch.scene.body_count > 1:
+    if batch.scene.body_count > 1 and features.pair_size:
         pair_mean, pair_deviation = spread(
             features.of_pairs, features.pair_weights, features.pair_signs
         )

@@ -83,6 +83,12 @@ class Mixture:
         for task in self.tasks:
             check_task(task)
             _check_alike(first, task.store)
+            if task.features != self.lead.features:
+                raise BadStore(
+                    f"{task.store.path}: pushes of {task.store.info.bodies} disks, not "
+                    f"{first.info.bodies}; a network on the whole state takes one "
+                    "number of disks."
+                )
 
     def begin(self) -> tuple[FitState, list[LossWeights]]:
         """Return the first state, and the weights of the loss for each dataset."""

@@ -191,7 +191,9 @@ class Recipe:
     too, with which the friction of a real surface varies. contact: those of each
     contact in its own frame, for any number of disks (only around an engine). letter:
     those of the paper's equations in SI units, along the axes of the table.
-    letter-push-frame: the same in the push frame."""
+    letter-push-frame: the same in the push frame. whole-state: a feedforward network,
+    for as many disks as the training pushes have. nominal: the paper's, of assumed
+    masses and radii."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""

@@ -55,7 +55,7 @@ def make_optimizer(optimiser: Optimiser) -> optax.GradientTransformation:
 
 def trained_layers(network: AbstractNetwork) -> Trained:
     """Return the part of a network that is trained: all except its scales."""
-    return network.rel, network.dyn
+    return network.trained
 
 
 def with_layers(network: AbstractNetwork, layers: Trained) -> AbstractNetwork:

@@ -88,6 +88,7 @@ class Task:
             info.kind,
             simulator=self.model == "sain",
             time_step=info.time_step,
+            disks=info.bodies,
         )
 
     @property
@@ -193,8 +194,10 @@ def first_network(task: Task, scales: Scales) -> AbstractNetwork:
     network = task.existing.network
     if isinstance(network, ContactNetwork):
         return network.held(task.recipe.horizon.hold)
+    if task.features == network.features:
+        return network
     assert isinstance(network, InteractionNetwork)
-    return widen(network, scales) if task.features != network.features else network
+    return widen(network, scales)
 
 
 def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:

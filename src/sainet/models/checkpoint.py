@@ -13,10 +13,16 @@ from jaxtyping import PRNGKeyArray
 from sainet.models.card import CARD, WEIGHTS, Card, read_card
 from sainet.models.contacts import ContactFeatures
 from sainet.models.correctors.contact import HOLD, ContactNetwork
+from sainet.models.correctors.feedforward import (
+    FeedforwardNetwork,
+    WholeState,
+    whole_state,
+)
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.correctors.network import AbstractNetwork, Scales
 from sainet.models.features import AbstractFeatures, FeatureSet, feature_set
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
+from sainet.models.nominal import NominalFeatures
 from sainet.runs.documents import content_hash, read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
 
@@ -92,6 +98,7 @@ def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
         card.kind,
         simulator=card.identity.kind == "sain",
         time_step=card.time_step,
+        disks=card.disks,
     )
     hold = card.recipe.hold
     hold = 1 if hold is msgspec.UNSET else hold
@@ -106,7 +113,7 @@ def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
 
 
 def features_of(
-    name: str, setup: str, *, simulator: bool, time_step: float
+    name: str, setup: str, *, simulator: bool, time_step: float, disks: int
 ) -> AbstractFeatures:
     """Return the inputs of a network.
 
@@ -115,10 +122,14 @@ def features_of(
         setup: whose controls the network takes, `robot` or `direct-force`.
         simulator: whether the network takes the simulator prediction (SAIN).
         time_step: s.
+        disks: number of disks of every scene, of a network that takes only so many.
     """
+    if name == "whole-state":
+        return whole_state(setup, simulator=simulator, disks=disks)
     if name == "contact":
         return ContactFeatures(time_step)
-    return feature_set(setup, simulator=simulator, name=name)
+    found = feature_set(setup, simulator=simulator, name=name)
+    return NominalFeatures(found.blocks) if name == "nominal" else found
 
 
 def new_network(
@@ -142,6 +153,10 @@ def new_network(
     """
     if isinstance(features, ContactFeatures):
         return ContactNetwork(features, key=key, scales=scales, hold=hold)
+    if isinstance(features, WholeState):
+        return FeedforwardNetwork(
+            features, time_step=time_step, key=key, scales=scales, integrator=integrator
+        )
     assert isinstance(features, FeatureSet)
     return InteractionNetwork(
         features, time_step=time_step, key=key, scales=scales, integrator=integrator

@@ -204,8 +204,10 @@ def stored_prediction(
 SAME_TIME = 1e-9  # s, difference below which time steps are equal
 
 
-def check_purpose(dynamics: AbstractDynamics, kind: str, time_step: float) -> None:
-    """Raise `BadCheckpoint` if a network is for another time step or other controls.
+def check_purpose(
+    dynamics: AbstractDynamics, kind: str, time_step: float, disks: int
+) -> None:
+    """Raise `BadCheckpoint` if a network is for other steps, controls or disks.
 
     Its predictions would be wrong without any other sign.
 
@@ -213,10 +215,12 @@ def check_purpose(dynamics: AbstractDynamics, kind: str, time_step: float) -> No
         dynamics: the model.
         kind: setup of the pushes, `Controls.kind`.
         time_step: of the scene, s.
+        disks: number of disks of the scene.
     """
     made_for = dynamics.made_for
     if made_for is None:
         return
+    made_for.check_disks(disks)
     if made_for.kind != kind:
         raise BadCheckpoint(
             f"model: its network is for {made_for.kind} pushes, these are {kind} "

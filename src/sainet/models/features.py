@@ -18,7 +18,8 @@ from sainet.models.blocks import (
     RelativePose,
     SimulatedStep,
 )
-from sainet.models.inputs import Moment, PushFrame
+from sainet.models.inputs import Moment, PushFrame, Still, still_features
+from sainet.scenes.scene import Scene
 
 Signs = tuple[int, ...]
 
@@ -70,6 +71,10 @@ class AbstractFeatures(ABC):
     @abstractmethod
     def of_bodies(self, moment: Moment) -> Float[Array, "feature body push"]:
         """Return the inputs of f_dyn except the effects."""
+
+    def still(self, scene: Scene, frame: PushFrame) -> Still:
+        """Return the properties that the network is given: the true ones."""
+        return still_features(scene, frame)
 
     def pair_weights(self, moment: Moment) -> Float[Array, "other body push"] | None:
         """Return how much each pair counts in statistics; None is equally."""

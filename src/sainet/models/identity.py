@@ -12,9 +12,18 @@ Kind = Literal["physics", "in", "sain", "gp", "published"]
 # pushes; "residual" an additive network and "real" a new one, recorded pushes only.
 TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "real"]
 ModelKind = Literal["in", "sain"]  # of networks
-# "contact" is the form of contact networks, beyond the paper.
-# "letter" takes the inputs of the paper's equations as they are, see `models.features`.
-Features = Literal["paper", "place", "contact", "letter", "letter-push-frame"]
+# Beyond the paper's: "contact" is the form of contact networks, "whole-state" that of
+# feedforward networks. "letter" takes the inputs of the paper's equations as they are,
+# see `models.features`; "nominal": the paper's, of assumed masses and radii.
+Features = Literal[
+    "paper",
+    "place",
+    "contact",
+    "letter",
+    "letter-push-frame",
+    "whole-state",
+    "nominal",
+]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
 Variant = Literal[
     "",
@@ -23,6 +32,8 @@ Variant = Literal[
     "for-all",
     "ensemble",
     "one-to-four",
+    "three-disks",
+    "fixed-properties",
     "loss-in-metres",
     "large-l2",
     "small-l2",
@@ -31,6 +42,7 @@ Variant = Literal[
 NETWORKS = get_args(ModelKind)
 LEARNED = (*NETWORKS, "gp")
 _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
+_FEEDFORWARD = {"in": "Feedforward", "sain": "SA feedforward"}
 _VARIANTS = {
     "single-steps": "single steps",
     "for-all": "all surfaces",
@@ -40,6 +52,9 @@ _VARIANTS = {
     "loss-in-metres": "loss in metres",
     "large-l2": "large l2",
     "small-l2": "small l2",
+    "three-disks": "3 disks",
+    "fixed-properties": "fixed properties",
+    "nominal": "nominal inputs",
 }
 
 
@@ -67,10 +82,12 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
         """The name for readers."""
         if self.name:
             return self.name
-        label = _KINDS[self.kind] + self._engine_label()
-        words = filter(None, self._parts()[1:])
+        kinds, words = _KINDS, filter(None, self._parts()[1:])
         if self.features == "contact":  # always residuals
             words = (word for word in words if word != self.data)
+        if self.features == "whole-state":
+            kinds, words = _FEEDFORWARD, (w for w in words if w != self.features)
+        label = kinds[self.kind] + self._engine_label()
         return ", ".join([label, *(_VARIANTS.get(word, word) for word in words)])
 
     def _parts(self) -> list[str]:

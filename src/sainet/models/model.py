@@ -103,7 +103,8 @@ class Model:
                 f"{self.name} does not run in JAX, which cannot trace it; give a batch "
                 "of pushes."
             )
-        check_purpose(self.dynamics, kind_of(push), scene.time_step)
+        disks = scene.body_count
+        check_purpose(self.dynamics, kind_of(push), scene.time_step, disks)
         if not isinstance(push, Push):
             return predict(self.dynamics, scene, state, push)
         steps = steps_of(push, scene.time_step) if steps is None else steps
@@ -116,6 +117,7 @@ class Model:
         kind: str,
         time_step: float,
         *,
+        disks: int | None = None,
         seed: int | None = None,
         pushes: UInt64[np.ndarray, " push"] | None = None,
     ) -> None:
@@ -124,6 +126,7 @@ class Model:
         Args:
             kind: setup of the pushes.
             time_step: of the pushes (s).
+            disks: number of disks in each push; None: unknown.
             seed: of simulated test pushes; None otherwise.
             pushes: hashes of the test pushes (`Store.push_hashes`); None: unknown.
         """
@@ -141,6 +144,8 @@ class Model:
                 f"{path}: time_step is {self.card.time_step} s, the data's is "
                 f"{time_step} s; train a network on such data, or give `force`."
             )
+        if disks is not None and self.dynamics.made_for is not None:
+            self.dynamics.made_for.check_disks(disks, path)
         if seed is not None and seed in self.card.data_seeds:
             raise BadCheckpoint(
                 f"{path}: data_seeds has {seed}, the seed of the data: the network may "

@@ -66,7 +66,8 @@ class AbstractPlanner(eqx.Module):
             BadCheckpoint: the model is for another time step or other controls.
             Diverged: no candidate push has a finite prediction.
         """
-        check_purpose(dynamics, PathControls.kind, scene.time_step)
+        kind, disks = PathControls.kind, scene.body_count
+        check_purpose(dynamics, kind, scene.time_step, disks)
         gap = check_observation(scene, state)
         problem = Problem(dynamics, task, scene, state, self.actions, self.expected)
         found = self.search(problem)

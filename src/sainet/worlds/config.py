@@ -12,6 +12,7 @@ SetupName = Literal["robot", "direct-force"]
 # touches the one before. triangle: each further one touches two others.
 Arrangement = Literal["cluster", "row", "triangle"]
 Range = tuple[float] | tuple[float, float]
+OfDisks = tuple[tuple[float, ...]]  # one constant for each disk
 _RIGHT_ANGLE = 90  # degrees
 
 _COUNTS = {
@@ -103,6 +104,16 @@ class WorldConfig:
         for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
             value = getattr(self, name)
             require(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
+
+    @property
+    def masses(self) -> Range | OfDisks:
+        """The distribution of the masses of the disks (kg)."""
+        return self.mass_kg
+
+    @property
+    def radii(self) -> Range | OfDisks:
+        """The distribution of the radii of the disks (mm)."""
+        return self.radius_mm
 
 
 def bounds(values: Range) -> tuple[float, float]:

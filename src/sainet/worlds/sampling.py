@@ -11,7 +11,7 @@ from sainet.scenes.pushes import Push, place_pusher
 from sainet.scenes.scene import Scene
 from sainet.scenes.shapes import pusher_gaps
 from sainet.scenes.state import State, at_rest, in_a_row
-from sainet.worlds.config import Range, WorldConfig, bounds
+from sainet.worlds.config import OfDisks, Range, WorldConfig
 
 _ARRANGEMENTS = 200  # of all disks of a scene
 _TRIES = 50  # for each disk of an arrangement
@@ -75,11 +75,11 @@ def draw(config: WorldConfig, rng: np.random.Generator, pushes: int) -> Draws:
     Raises:
         BadInput: a disk or the pusher could not be placed without overlap.
     """
-    radius = _uniform(rng, config.radius_mm, (pushes, config.disks)) / 1000
+    radius = _uniform(rng, config.radii, (pushes, config.disks)) / 1000
     contact = np.deg2rad(config.contact_angle_deg)
     heading = np.deg2rad(config.direction_deg)
     draws = Draws(
-        mass=_uniform(rng, config.mass_kg, (pushes, config.disks)),
+        mass=_uniform(rng, config.masses, (pushes, config.disks)),
         radius=radius,
         table_friction=_uniform(rng, config.table_friction, (pushes,)),
         contact_friction=_uniform(rng, config.contact_friction, (pushes,)),
@@ -94,9 +94,9 @@ def draw(config: WorldConfig, rng: np.random.Generator, pushes: int) -> Draws:
 
 
 def _uniform(
-    rng: np.random.Generator, values: Range, shape: tuple[int, ...]
+    rng: np.random.Generator, values: Range | OfDisks, shape: tuple[int, ...]
 ) -> np.ndarray:
-    return rng.uniform(*bounds(values), shape)
+    return rng.uniform(values[0], values[-1], shape)
 
 
 def _place(

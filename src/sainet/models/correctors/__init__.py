@@ -7,6 +7,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from sainet.models.inputs import PushFrame
+from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -51,6 +52,15 @@ class Purpose(NamedTuple):
 
     kind: str  # of the setup that makes the controls
     time_step: float  # s
+    disks: int | None = None  # of every scene; None: any number
+
+    def check_disks(self, disks: int, source: str = "model") -> None:
+        """Raise `BadCheckpoint` if the corrector takes another number of disks."""
+        if self.disks not in (None, disks):
+            raise BadCheckpoint(
+                f"{source}: the network takes {self.disks} disks, not {disks}; use an "
+                "interaction network, or train one of this form on such scenes."
+            )
 
 
 class AbstractCorrector(eqx.Module):

@@ -81,6 +81,11 @@ class ContactNetwork(AbstractNetwork):
         return eqx.tree_at(parts, other, parts(self))
 
     @property
+    def trained(self) -> tuple[Layers, ...]:
+        """Those of both kinds of contacts."""
+        return self.rel, self.dyn
+
+    @property
     def unroll(self) -> Callable[..., Array]:
         """The zero-order hold, in training and in prediction alike."""
         return partial(unroll_held, hold=self.hold)

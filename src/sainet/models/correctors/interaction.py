@@ -66,6 +66,11 @@ class InteractionNetwork(AbstractNetwork):
         self.time_step = time_step
         self.integrator = integrator
 
+    @property
+    def trained(self) -> tuple[Layers, ...]:
+        """f_rel and f_dyn."""
+        return self.rel, self.dyn
+
     def acceleration(self, moment: Moment) -> Float[Array, "3 body push"]:
         """Return f_dyn of each body: m/s^2, m/s^2 and rad/s^2 (eq. 5 and 10)."""
         inputs = self._scaled(

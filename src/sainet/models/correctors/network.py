@@ -21,7 +21,6 @@ from sainet.models.inputs import (
     in_columns,
     motion_from_frame,
     motion_to_frame,
-    still_features,
 )
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
@@ -81,8 +80,6 @@ class Scales(eqx.Module):
 class AbstractNetwork(AbstractCorrector):
     """Predicts the next motion of any number of bodies, by the acceleration of each."""
 
-    rel: eqx.AbstractVar[Layers]  # f_rel
-    dyn: eqx.AbstractVar[Layers]  # f_dyn, which ends in a read-out of accelerations
     scales: eqx.AbstractVar[Scales]
     features: eqx.AbstractVar[Any]  # `AbstractFeatures`; each form has its own
     time_step: eqx.AbstractVar[float]  # s
@@ -92,6 +89,11 @@ class AbstractNetwork(AbstractCorrector):
     def made_for(self) -> Purpose:
         """The pushes that the network is for."""
         return Purpose(self.features.kind, self.time_step)
+
+    @property
+    @abstractmethod
+    def trained(self) -> tuple[Layers, ...]:
+        """The layers that are trained: everything except the scales."""
 
     @property
     def unroll(self) -> Callable[..., Array]:
@@ -150,6 +152,7 @@ class AbstractNetwork(AbstractCorrector):
             simulated: packed s-bar after each step, in the table frame; None for IN.
             unroll: instead of the network's own, the zero-order hold of training.
         """
+        self.made_for.check_disks(scene.body_count)
         frame = self.features.axes(start.frame)
         initial = motion_to_frame(pack_motion(start.predicted), frame)
         before, path = initial, None
@@ -160,7 +163,7 @@ class AbstractNetwork(AbstractCorrector):
         if start.simulated is not None:
             before = motion_to_frame(pack_motion(start.simulated), frame)
         drive = drives(controls.in_frame(frame.origin, frame.angle), before, path)
-        still = still_features(scene, frame)
+        still = self.features.still(scene, frame)
         found = (unroll or self.unroll)(self, initial, still, drive, before=before)
         if frame is start.frame:
             return found
