@@ -125,7 +125,9 @@ def acting_on(local, motion, i: int) -> list[int]:
     return [j for j in others if gaps[j] <= 0.02]
 
 
-def pair_inputs(local, motion, rate_step, i: int, j: int, *, poses: bool) -> np.ndarray:
+def pair_inputs(
+    local, motion, rate_step, i: int, j: int, *, poses: bool = False
+) -> np.ndarray:
     """Inputs of f_rel for a pair (eq. 4; with the simulator eq. 9)."""
     numbers = 3 if poses else 2  # of p_i - p_j: with the angle, or without
     return np.concatenate(
