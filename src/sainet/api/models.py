@@ -21,9 +21,9 @@ def load(model: Loadable, *, engine: str | None = None) -> Model:
 
     Args:
         model: `physics`, `physics-true`; a network that ships with the package: `in`,
-            `sain`, `sain-bullet`, `in-stroke`, `sain-stroke`; or the folder of a
-            trained network or of identified parameters. A model is returned as it is;
-            dynamics of your own become one.
+            `sain`, `sain-bullet`, `in-stroke`, `sain-stroke`, `sain-any`; or the folder
+            of a trained network or of identified parameters. A model is returned as it
+            is; dynamics of your own become one.
         engine: inside the model, `planar` or `bullet`; None is planar for physics, and
             for a network the engine that it was trained around.
 

@@ -47,7 +47,8 @@ PHYSICS: Mapping[str, Assumptions] = {"physics": PAPER, "physics-true": TRUE_PRO
 PRETRAINED = Path(__file__).parent / "pretrained"
 OF_PAPER = ("in", "sain", "sain-bullet")
 OF_STROKES = ("in-stroke", "sain-stroke")  # of one disk, as recorded on a robot
-SHIPPED = (*OF_PAPER, *OF_STROKES)
+OF_ANY_NUMBER = ("sain-any",)  # of disks: a contact network
+SHIPPED = (*OF_PAPER, *OF_STROKES, *OF_ANY_NUMBER)
 MODELS = (*PHYSICS, *SHIPPED)
 
 
@@ -86,9 +87,9 @@ def load_model(
 
     Args:
         name: `physics`, `physics-true`, a shipped network (`in`, `sain`,
-            `sain-bullet`, `in-stroke`, `sain-stroke`), or a folder: of a trained
-            network (`./sain` where a shipped one has its name), or of identified
-            parameters.
+            `sain-bullet`, `in-stroke`, `sain-stroke`, `sain-any`), or a folder: of a
+            trained network (`./sain` where a shipped one has its name), or of
+            identified parameters.
         engine: inside the model; None is planar for physics, and for a network the
             one that it was trained around.
         force: put a network around another engine all the same.
