@@ -23,13 +23,15 @@ class Ruled:
         p: corrected unless the claim is primary; None: it does not hold by its
             intervals, or its rule has no p.
         is_primary: whether it is the first claim of its study.
-        contradicting: comparisons that contradict the claim.
+        comparisons: all that the ruling rests on.
+        contradicting: those of them that contradict the claim.
     """
 
     claim: Claim
     status: Status
     p: float | None
     is_primary: bool
+    comparisons: tuple[Comparison, ...] = ()
     contradicting: tuple[Comparison, ...] = ()
 
 
@@ -49,7 +51,8 @@ def rule_on(claims: Sequence[Claim], summary: Summary) -> tuple[Ruled, ...]:
         if number and p is not None:
             p = next(corrected)
             status = status if p < CHANCE else "does not hold"
-        found.append(Ruled(claim, status, p, not number, verdict.contradicting))
+        rests_on = verdict.comparisons, verdict.contradicting
+        found.append(Ruled(claim, status, p, not number, *rests_on))
     return tuple(found)
 
 

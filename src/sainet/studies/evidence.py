@@ -54,6 +54,11 @@ class Evidence:
             )
         return self._summaries[name]
 
+    def find(self, name: str) -> Summary | None:
+        """Return the summary of a study, or None if no evidence of it is kept."""
+        paths = (self.folder / f"{name}{end}" for end in (".nc.xz", ".json"))
+        return self.summary(name) if any(p.is_file() for p in paths) else None
+
     def measured(self, name: str) -> Measurements:
         """Return the measurements of a study."""
         return read_measurements(self.folder / f"{name}.nc.xz")

@@ -30,6 +30,9 @@ from sainet.report.writers import (
 )
 from sainet.runs.documents import write_bytes
 from sainet.studies import STUDIES, load_study
+from sainet.studies.conclusions import HEADINGS as CLAIM_HEADINGS
+from sainet.studies.conclusions import conclude
+from sainet.studies.conclusions import rows_of as rows_of_claims
 from sainet.studies.evidence import (
     FIGURES,
     Benchmark,
@@ -67,6 +70,9 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "origin": lambda name: origin(summary(name)),
         "claims": lambda name: "\n\n".join(
             rulings(load_study(name).claims, summary(name))
+        ),
+        "conclusions": lambda: _table(
+            CLAIM_HEADINGS, rows_of_claims(conclude(evidence.find)), align=":--"
         ),
         "choices": lambda name: choices(load_study(name).choose(summary(name))),
         "ratios": lambda name: ratios(summary(name)),
