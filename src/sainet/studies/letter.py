@@ -115,7 +115,7 @@ class World:
 REDUCED = {"quick": Sizes(100, 50, 20), "paper": Sizes(1000, 500, 1000)}
 # A world whose Physics row is near the published one (`published_physics`): the damper
 # is so weak that the friction, which no model knows, decides how far disks move.
-WEAK_DAMPER = GenerateConfig(damping_n_s_m=100.0, force_n=3.5)
+WEAK_DAMPER = GenerateConfig(damping_n_s_m=100.0, force_n=3.5, gap_mm=-2.0)
 
 
 def _chain(scope: Scope) -> Plan:

@@ -158,7 +158,7 @@ def _is_near(metrics: tuple[str, ...]) -> Claim:
 def closest(summary: Summary) -> tuple[Choice, ...]:
     """Return the settings, each with its distance from the published positions."""
     found = [
-        Choice(change=each.factors, score=furthest(summary, each))
+        Choice(condition=each.label, score=furthest(summary, each))
         for each in _measured(summary)
     ]
     return tuple(sorted(found, key=lambda each: each.score))

@@ -38,6 +38,7 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """One setting that a study tried, and its score: errors over those of physics."""
 
     score: float
+    condition: str | None = None  # label
     l2: float | None = None
     pushes: int | None = None
     start: str | None = None
@@ -50,9 +51,8 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         found: dict[str, str] = {}
         if self.l2 is not None:
             found["l2"] = f"{self.l2:g}"
-        if self.start is None and self.change:
-            words = (f"{k.replace('_', ' ')} {v}" for k, v in self.change.items())
-            found["setting"] = ", ".join(words)
+        if self.condition is not None:
+            found["setting"] = self.condition
         if self.start is not None:
             changes = (self.change or {}).items()
             words = ", ".join(f"{k.replace('_', ' ')} {v}" for k, v in changes)
