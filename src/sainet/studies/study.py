@@ -62,7 +62,7 @@ class Choice(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
         return found | {name: f"{value:.3f}" for name, value in scores.items()}
 
 
-class Ruling(msgspec.Struct, frozen=True):
+class Ruling(msgspec.Struct, frozen=True, omit_defaults=True):
     """A claim and its verdict."""
 
     claim: str
