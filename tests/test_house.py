@@ -368,8 +368,8 @@ COUNTS = {
     ),
     "code lines of the whole paper": (
         lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
-        900,
-        900,
+        1_200,
+        1_200,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),
