@@ -92,7 +92,8 @@ def errs_less(
             return Verdict("not testable here", found)
         wrong = tuple(each for each in found if sign(each) >= 0)
         # All must hold: the least certain one decides (an intersection-union test).
-        p = None if wrong else max(each.p or 0.0 for each in found)
+        known = [each.p for each in found if each.p is not None]
+        p = max(known) if not wrong and len(known) == len(found) else None
         return Verdict("does not hold" if wrong else "holds", found, wrong, p)
 
     return rule

@@ -114,7 +114,8 @@ class World:
 
 REDUCED = {"quick": Sizes(100, 50, 20), "paper": Sizes(1000, 500, 1000)}
 # A world whose Physics row is near the published one (`published_physics`): the damper
-# is so weak that the friction, which no model knows, decides how far disks move.
+# is so weak that the friction, which no model knows, decides how far disks move. That
+# is twice the paper's stroke for disk 1.
 WEAK_DAMPER = GenerateConfig(damping_n_s_m=100.0, force_n=3.5, gap_mm=-2.0)
 
 
@@ -147,10 +148,10 @@ def _sain_errs_less(stages: Sequence[Stage], condition: str = "") -> tuple[Claim
     return tuple(
         Claim(
             f"SAIN errs less than IN, {stage.label}{where}",
-            errs_less(sain.slug, alone.slug, condition=condition),
+            errs_less(augmented.slug, without.slug, condition=condition),
         )
         for stage in stages
-        for alone, sain in [tuple(stage.networks())]
+        for without, augmented in [tuple(stage.networks())]
     )
 
 

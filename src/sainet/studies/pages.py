@@ -17,6 +17,7 @@ import jinja2
 
 from sainet.evaluation.claims import places
 from sainet.evaluation.coverage import HEADINGS, rows_of
+from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.rulings import rule_on
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
@@ -74,6 +75,7 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "conclusions": lambda: _table(
             CLAIM_HEADINGS, rows_of_claims(conclude(evidence.find)), align=":--"
         ),
+        "choose": lambda name: load_study(name).choose(summary(name)),
         "choices": lambda name: choices(load_study(name).choose(summary(name))),
         "ratios": lambda name: ratios(summary(name)),
         "beside_paper": lambda name: beside_published(summary(name)),
@@ -82,6 +84,7 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "errors": lambda name, *which: errors(summary(name), *which),
         "saving": lambda metric: saving(evidence.measured("recorded-active"), metric),
         "solved": solved,
+        "travel": lambda name, *where: travel(evidence.measured(name), *where),
         "identified": lambda: identified(evidence.identifications()),
         "bench": lambda case: bench(evidence.benchmark(case)),
         "figure": lambda case, name: evidence.benchmark(case).figures[name],
@@ -101,6 +104,13 @@ def errors(
 ) -> list[str]:
     """Return the errors of a model, disks apart: one text for each metric."""
     return [slashed(summary.errors(model, key, where)) for key in metrics]
+
+
+def travel(measured: Measurements, where: str = "") -> str:
+    """Return how far each disk moved in a condition, on average, in mm."""
+    (condition,) = (c for c in measured.header.conditions if c.label == where)
+    moved = measured.data["travel_mm"].values[measured.samples_of(condition)]
+    return " / ".join(f"{mean:.0f}" for mean in moved.mean(axis=0))
 
 
 def solved(summary: Summary, condition: str, model: str) -> str:

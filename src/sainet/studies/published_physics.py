@@ -24,7 +24,8 @@ from sainet.studies.steps import Evaluate, Join, Simulate
 from sainet.studies.study import Choice, Plan, Scope, Study
 from sainet.worlds.noise import NoiseConfig
 
-# Damping (N s/m) and the force (N) that pushes for about 1 cm against it.
+# Damping (N s/m) and a force (N) against it. The weakest damper lets disk 1 travel some
+# 2 cm, twice the paper's stroke: a smaller force leaves more disks at rest.
 DRIVES = ((1000.0, 8.0), (300.0, 4.5), (100.0, 3.5))
 SPEEDS_MM_S = (50.0, 5.0)  # of the robot; the slower one takes the paper's 2 s
 GAPS_MM = (0.0, -2.0, -4.0)
@@ -41,7 +42,7 @@ class Setting:
 
     config: GenerateConfig
     noise: int = 1  # multiple of the noise of the pusher
-    steps: int | None = None  # that count; None: all
+    steps: int | None = None  # that count; None: the first 200
 
     @property
     def factors(self) -> dict[str, float | str]:

@@ -13,6 +13,13 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
+from sainet.models.blocks import (
+    ACTIONS,
+    Block,
+    Motion,
+    Properties,
+    SimulatedStep,
+)
 from sainet.models.correctors import Purpose
 from sainet.models.correctors.interaction import WIDTHS
 from sainet.models.correctors.network import (
@@ -24,15 +31,7 @@ from sainet.models.correctors.network import (
     standardise,
     unit_scales,
 )
-from sainet.models.features import (
-    ACTIONS,
-    AbstractFeatures,
-    Block,
-    FeatureSet,
-    Motion,
-    Properties,
-    SimulatedStep,
-)
+from sainet.models.features import AbstractFeatures, FeatureSet
 from sainet.models.inputs import Moment, given
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 
