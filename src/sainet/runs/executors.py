@@ -24,6 +24,7 @@ from typing import Any, final
 from sainet.runs.errors import BadInput, MissingExtra, SainetError
 from sainet.runs.interrupts import forget_interrupts, remember_interrupt
 from sainet.runs.manifest import code_versions, use_cache
+from sainet.runs.shards import Shard
 from sainet.runs.workers import worker_pool
 
 _ANSWERS_IN = 10  # s that a scheduler has to answer
@@ -33,11 +34,24 @@ _CLOSES_IN = 2  # s
 
 @dataclass(frozen=True)
 class Machines:
-    """Where independent pieces run."""
+    """Where independent pieces run, and which of them."""
 
     scheduler: str | None = None
     """Address of a Dask scheduler, for example tcp://node1:8786, whose workers do the
     work instead of processes on this machine; needs the extra cluster. Default: none."""
+    shard: str | None = None
+    """Share of the independent pieces to do, for example 3/8 for the third of eight.
+    Shards may run at once, on any machines that share the folder; the same command
+    without a shard makes what is missing and finishes. Default: everything."""
+
+    @property
+    def share(self) -> Shard | None:
+        """The shard, if one is given.
+
+        Raises:
+            BadSetting: the text names no shard.
+        """
+        return None if self.shard is None else Shard.parse(self.shard)
 
     @contextmanager
     def executor(

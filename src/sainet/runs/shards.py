@@ -58,6 +58,10 @@ class Shard:
         """Return whether a piece belongs to this shard; pieces are counted from 0."""
         return index % self.count == self.number - 1
 
+    def own(self, count: int) -> list[int]:
+        """Return the indices of its pieces, of so many."""
+        return [index for index in range(count) if self.takes(index)]
+
     def __str__(self) -> str:
         """Return the text that `parse` reads."""
         return f"{self.number}/{self.count}"
@@ -106,11 +110,14 @@ def open_share(
     Raises:
         RunConflict: the folder has shards of other settings or versions, or a command
             without a shard is at work there.
+        BadInput: a file was changed after this shard had finished it.
     """
     folder = open_run(out / SHARDS, settings, finished_by="", shared=True)
     _check_versions(folder.path)
     path = _list(out, shard)
     pieces = _read(path).files if path.exists() else {}
+    for files in pieces.values():
+        check_files(out, files)
     share = Share(out, shard, dict(pieces), folder)
     if not path.exists():
         write_document(path, Pieces(share.pieces))
