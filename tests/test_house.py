@@ -256,6 +256,8 @@ WHOLE_PAPER = (
     "studies/feedforward",
     "studies/letter",
     "studies/published_physics",
+    "evaluation/parts",
+    "studies/shares",
 )
 ENGINEER = (
     "cli/inspect",

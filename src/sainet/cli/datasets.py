@@ -1,6 +1,5 @@
 """Commands that make datasets: `generate`, `import`, `split` and `add-bystander`."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -50,7 +49,10 @@ class Generate:
         total = None if shard else self.config.pushes
         bar = progress_bar("Simulating", total, self.output)
         with self.machines.executor(self.workers) as pool, bar as advance:
-            report: Callable[[int], None] = lambda pushes: advance(pushes, "")
+
+            def report(pushes: int) -> None:
+                advance(pushes, "")
+
             if shard is not None:
                 pushes = generate_share(
                     self.config, self.out, shard, executor=pool, on_pushes=report

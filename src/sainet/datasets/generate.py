@@ -95,7 +95,7 @@ def generate_share(
         {"command": "generate", **asdict(config)},
         store_info(config),
         partial(simulate_chunk, config),
-        shard,
+        shard=shard,
         executor=executor,
         on_pushes=on_pushes,
     )

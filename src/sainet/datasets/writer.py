@@ -54,7 +54,7 @@ def write_once(
         _clear_progress(out)
     else:
         shards = collect(out, settings)
-        _write(out, info, make_chunk, executor, on_pushes, shards)
+        _write(out, info, make_chunk, executor, on_pushes=on_pushes, shards=shards)
     return open_store(out)
 
 
@@ -63,8 +63,8 @@ def write_share(
     settings: Mapping[str, object],
     info: schema.StoreInfo,
     make_chunk: MakeChunk,
-    shard: Shard,
     *,
+    shard: Shard,
     executor: Executor | None = None,
     on_pushes: Callable[[int], None] = lambda pushes: None,
 ) -> int:
@@ -130,7 +130,7 @@ def write_store(folder: Path, info: schema.StoreInfo, arrays: schema.Arrays) -> 
     def part(index: int) -> schema.Arrays:
         return {name: a[info.chunk_slice(index)] for name, a in arrays.items()}
 
-    _write(folder, info, part, None, lambda pushes: None)
+    _write(folder, info, part, None)
 
 
 def _write(
@@ -138,7 +138,8 @@ def _write(
     info: schema.StoreInfo,
     make_chunk: MakeChunk,
     executor: Executor | None,
-    on_pushes: Callable[[int], None],
+    *,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
     shards: Collected | None = None,
 ) -> None:
     """Write the missing chunks, then the list of all hashes, which completes it."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +13,7 @@ from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store
 from sainet.engines.devices import over_devices
 from sainet.evaluation import coverage, measurements, metrics
+from sainet.evaluation.parts import Parts
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.identity import ModelId
@@ -32,6 +33,7 @@ def evaluate(
     steps: int | None = None,
     force: bool = False,
     on_pushes: OnPushes = lambda model, pushes: None,
+    parts: Parts | None = None,
 ) -> measurements.Measurements:
     """Predict every stored push with every model and measure the errors.
 
@@ -41,6 +43,7 @@ def evaluate(
         steps: to predict; 0 is all, None the paper's 200 (recorded pushes: all).
         force: use networks on other pushes than they were trained for.
         on_pushes: called with the model and the number of pushes predicted since.
+        parts: keeps the errors of each model; None keeps nothing.
 
     Raises:
         BadCheckpoint: a network does not fit the pushes.
@@ -57,7 +60,8 @@ def evaluate(
     for model in () if force else models:
         model.check_fits(info.kind, info.time_step, seed=info.seed, pushes=hashes)
     pushes = _Pushes(store, _limit(store, steps))
-    errors = [_errors(model, pushes, on_pushes) for model in models]
+    made = {m.name: partial(_errors, m, pushes, on_pushes) for m in models}
+    errors = [parts.errors(k, make) if parts else make() for k, make in made.items()]
     return _measurements(models, pushes, errors)
 
 

@@ -38,7 +38,7 @@ class Machines:
 
     scheduler: str | None = None
     """Address of a Dask scheduler, for example tcp://node1:8786, whose workers do the
-    work instead of processes on this machine; needs the extra cluster. Default: none."""
+    work instead of processes on this machine (extra cluster). Default: none."""
     shard: str | None = None
     """Share of the independent pieces to do, for example 3/8 for the third of eight.
     Shards may run at once, on any machines that share the folder; the same command
@@ -215,7 +215,7 @@ class ClusterExecutor(Executor):
         return found
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the connection; waiting jobs are not begun, long ones end as at Ctrl-C."""
+        """End the connection; waiting jobs never begin, long ones end as at Ctrl-C."""
         self._has_ended.set()
         left = list(self._unfinished) if cancel_futures else []
         with suppress(Exception):  # of a connection that is lost
