@@ -247,18 +247,15 @@ ANY_NUMBER = (
     "learning/mixture",
     "studies/any_number",
 )
-# The whole paper with one command: letter, feedforward networks, many machines, claims.
+# The whole paper with one command: letter, feedforward networks, claims.
 WHOLE_PAPER = (
     "models/correctors/feedforward",
-    "runs/executors",
-    "runs/shards",
     "studies/conclusions",
     "studies/feedforward",
     "studies/letter",
     "studies/published_physics",
-    "evaluation/parts",
-    "studies/shares",
 )
+MANY_MACHINES = ("evaluation/parts", "runs/executors", "runs/shards", "studies/shares")
 ENGINEER = (
     "cli/inspect",
     "datasets/doubts",
@@ -288,6 +285,7 @@ LATER = ADDED + modules_of(
     + ENSEMBLES
     + ANY_NUMBER
     + WHOLE_PAPER
+    + MANY_MACHINES
 )
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
@@ -301,6 +299,8 @@ CONNECTIONS = {
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
     "the whole paper": 100,
+    # Shares of datasets, trials and evaluations, and the options of five commands.
+    "many machines": 225,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -365,6 +365,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
         900,
         900,
+    ),
+    "code lines of many machines": (
+        lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),
+        495,
+        495,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),

@@ -107,7 +107,7 @@ def test_a_fold_belongs_to_one_shard():
 
 def test_the_steps_of_a_plan_are_counted_once():
     measured, other = folds(2), folds(1)
-    lasts = last_steps([Plan(measured), Plan(other, as_trained=measured)])
+    lasts = list(last_steps([Plan(measured), Plan(other, as_trained=measured)]))
     assert len(lasts) == 3
     assert len(kept_steps(lasts)) == 6
 

@@ -4,7 +4,7 @@ A step belongs to one shard. A shard runs its steps whose inputs exist, until th
 remain wait for other shards; run again, it goes on.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,13 +61,12 @@ class Shared:
         )
 
 
-def last_steps(plans: Iterable[Plan]) -> list[Step[Any]]:
-    """Return the steps that studies ask for; all others are inputs of these."""
-    found: list[Step[Any]] = []
+def last_steps(plans: Iterable[Plan]) -> Iterator[Step[Any]]:
+    """Yield the steps that studies ask for; all others are inputs of these."""
     for plan in plans:
-        found += [plan.measured, *plan.networks, *plan.engine_errors.values()]
-        found += [] if plan.as_trained is None else [plan.as_trained]
-    return found
+        yield from (plan.measured, *plan.networks, *plan.engine_errors.values())
+        if plan.as_trained is not None:
+            yield plan.as_trained
 
 
 def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
@@ -124,7 +123,7 @@ def divided(steps: Mapping[str, Step[Any]], shard: Shard) -> list[Step[Any]]:
 
 
 def run_share(
-    lasts: Sequence[Step[Any]],
+    lasts: Iterable[Step[Any]],
     out: Path,
     settings: Mapping[str, object],
     shard: Shard,
@@ -172,7 +171,7 @@ def _ready(own: Iterable[Step[Any]], share: Share) -> list[Step[Any]]:
 
 @contextmanager
 def collected(
-    lasts: Sequence[Step[Any]], out: Path, settings: Mapping[str, object]
+    lasts: Iterable[Step[Any]], out: Path, settings: Mapping[str, object]
 ) -> Iterator[None]:
     """Check what shards have finished, if any; the body makes what is missing.
 
