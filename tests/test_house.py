@@ -247,7 +247,7 @@ ANY_NUMBER = (
     "learning/mixture",
     "studies/any_number",
 )
-# The whole paper with one command: letter, feedforward networks, many machines, claims.
+# The whole paper with one command: letter, feedforward networks, claims.
 WHOLE_PAPER = (
     # With lines that stood in models/features.py before.
     "models/blocks",
@@ -255,8 +255,6 @@ WHOLE_PAPER = (
     "models/correctors/feedforward",
     "models/nominal",
     "evaluation/rulings",
-    "runs/executors",
-    "runs/shards",
     "studies/conclusions",
     "studies/feedforward",
     "studies/letter",
@@ -264,6 +262,7 @@ WHOLE_PAPER = (
     "studies/published_physics",
     "studies/reduced_setup",
 )
+MANY_MACHINES = ("evaluation/parts", "runs/executors", "runs/shards", "studies/shares")
 ENGINEER = (
     "cli/inspect",
     "datasets/doubts",
@@ -293,6 +292,7 @@ LATER = ADDED + modules_of(
     + ENSEMBLES
     + ANY_NUMBER
     + WHOLE_PAPER
+    + MANY_MACHINES
 )
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
@@ -306,6 +306,8 @@ CONNECTIONS = {
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
     "the whole paper": 200,
+    # Shares of datasets, trials and evaluations, and the options of five commands.
+    "many machines": 225,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -370,6 +372,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
         1_200,
         1_200,
+    ),
+    "code lines of many machines": (
+        lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),
+        495,
+        495,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),

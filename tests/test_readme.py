@@ -49,12 +49,15 @@ COMMANDS = {page.name: commands(page.read_text()) for page in PAGES}
 # In a process of its own: the types of settings that are left to give are not checked.
 PARSER = """
 import json, shlex, sys
+from dataclasses import replace
 from sainet.cli.entry import parse
 asked = []
 for command in json.load(sys.stdin):
     print(command, file=sys.stderr)  # should it fail
     found = parse(shlex.split(command)[1:])
-    asked.append([str(getattr(found, "out", "")), repr(found)])
+    if hasattr(found, "machines"):  # any machines may share a folder
+        found = replace(found, machines=type(found.machines)())
+    asked.append([str(getattr(found, "out", None) or ""), repr(found)])
 json.dump(asked, sys.stdout)
 """
 

@@ -7,6 +7,7 @@ CONTENTS = {
         "importing",
         "tuning",
         "reproduce",
+        "many-machines",
         "virtual-lab",
         "robot",
         "troubleshooting",

@@ -8,7 +8,7 @@ import pytest
 import sainet as sn
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
 from sainet.scenes.pushes import command_path
-from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.scene import pair_gaps
 
 SCENE = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
 ANGLES = jnp.array([-0.3, 0.0, 0.4])

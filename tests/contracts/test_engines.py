@@ -33,8 +33,7 @@ from sainet.datasets.config import GenerateConfig
 from sainet.engines import ENGINES
 from sainet.engines.base import roll_out
 from sainet.scenes.controls import Controls, ForceControls, PathControls
-from sainet.scenes.scene import GRAVITY, TIME_STEP, Scene
-from sainet.scenes.shapes import pair_gaps, pusher_gaps
+from sainet.scenes.scene import GRAVITY, TIME_STEP, Scene, pair_gaps, pusher_gaps
 from sainet.scenes.state import State, pack_motion
 
 BATCH = 32  # scenes of each kind

@@ -20,13 +20,14 @@ from sainet.control import trials
 from sainet.control.config import ControlConfig
 from sainet.control.record import SUMMARY, episode_file
 from sainet.control.trial import make_trial
-from sainet.control.trials import measure_trials, prepare, run_trials
+from sainet.control.trials import measure_trials, prepare, run_share, run_trials
 from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
 from sainet.models.identity import ModelId
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs.documents import read_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs.folders import CONFIG as CONFIG_FILE
+from sainet.runs.shards import Shard
 from sainet.scenes.recording import Recording
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
@@ -73,6 +74,25 @@ def test_finished_episodes_are_kept_and_missing_ones_are_equal(done):
     assert reported == again
     with pytest.raises(RunConflict, match="pushes is 2, not 3"):
         run_trials(replace(CONFIG, pushes=3), out)
+
+
+def test_shards_run_the_same_episodes(done, tmp_path):
+    out = tmp_path / "out"
+    reported = []
+    for number in (2, 1, 2):  # the last finds all there
+        shard = Shard(number, 3)
+        assert run_share(CONFIG, out, shard, on_episode=reported.append) == 1
+    assert [each.trial for each in reported] == [1, 0, 1]
+    assert run_share(CONFIG, out, Shard(3, 3)) == 0
+    before = episode_file(out, 1).read_bytes()
+    episode_file(out, 1).write_bytes(before.replace(b"1", b"2", 1))
+    with pytest.raises(BadInput, match=r"001\.json: was changed after a shard"):
+        run_trials(CONFIG, out)
+    episode_file(out, 1).write_bytes(before)
+    records = run_trials(CONFIG, out)
+    assert list(map(without_times, records)) == list(map(without_times, done[1]))
+    assert not (out / "shards").exists()
+    assert run_share(CONFIG, out, Shard(1, 3)) == 1  # finished: nothing is done
 
 
 @pytest.mark.parametrize(

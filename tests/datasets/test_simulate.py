@@ -10,8 +10,7 @@ from sainet.datasets.batch import to_batch, to_controls, to_initial, to_scene
 from sainet.datasets.generate import simulate_chunk, store_info
 from sainet.datasets.schema import variables
 from sainet.scenes.controls import ForceControls, PathControls
-from sainet.scenes.scene import TIME_STEP
-from sainet.scenes.shapes import pair_gaps, pusher_gaps
+from sainet.scenes.scene import TIME_STEP, pair_gaps, pusher_gaps
 
 # One disk that is what the assumed engine takes it for.
 AS_ASSUMED = {

@@ -18,8 +18,7 @@ from sainet.engines.base import roll_out
 from sainet.engines.planar import solver
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.planar.solver import contact_budget, solve_close_pairs
-from sainet.scenes.scene import FrictionField
-from sainet.scenes.shapes import pair_gaps, pusher_gaps
+from sainet.scenes.scene import FrictionField, pair_gaps, pusher_gaps
 
 STEPS = 50
 

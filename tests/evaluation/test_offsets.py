@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
-from sainet.evaluation.evaluate import EndOffsets, end_offsets, evaluate
+from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.predictions import EndOffsets, end_offsets
 from sainet.models.library import load_model
 from sainet.report.figures.engine_errors import draw_engine_errors
 

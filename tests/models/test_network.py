@@ -37,8 +37,7 @@ from sainet.models.inputs import (
 )
 from sainet.models.integrators import RelaxingResidual
 from sainet.scenes.pushes import Push, command_path
-from sainet.scenes.scene import TIME_STEP
-from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.scene import TIME_STEP, pair_gaps
 from sainet.scenes.state import at_rest, pack_motion
 
 every_model = pytest.mark.parametrize("model", ["in", "sain"])

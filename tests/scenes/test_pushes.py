@@ -16,8 +16,7 @@ from sainet.scenes.pushes import (
     push_axis,
     push_direction,
 )
-from sainet.scenes.scene import TIME_STEP
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import TIME_STEP, pusher_gaps
 from sainet.scenes.state import at_rest
 
 

@@ -7,8 +7,7 @@ import pytest
 
 from contracts.worlds import make_scene, moving
 from sainet.runs.errors import BadScene
-from sainet.scenes.scene import Scene, check_scene
-from sainet.scenes.shapes import pair_gaps, pusher_gaps
+from sainet.scenes.scene import Scene, check_scene, pair_gaps, pusher_gaps
 from sainet.scenes.state import (
     Trajectory,
     at_rest,

@@ -109,9 +109,25 @@ def test_an_identical_command_fits_nothing_again(printed, command, capsys):
     assert len(engines) == FOLDS
 
 
+def test_shards_give_the_same_numbers(printed, command, tmp_path, capsys):
+    words = [*command[0], "--out", str(tmp_path)]
+    for number in (1, 2):
+        assert run([*words, "--shard", f"{number}/2"]) == 0
+        said = json.loads(capsys.readouterr().out)
+        assert said == {"shard": f"{number}/2", "done": 3, "waiting": 0}
+    assert run([*words, "--shard", "1/2", "--folds", "3"]) == 2
+    assert "folds is 2, not 3" in capsys.readouterr().err
+    assert run(words) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out) == printed | {"page": str(tmp_path / "report.html")}
+    assert "missing" not in told.err
+    assert not (tmp_path / "shards").exists()
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        (["--shard", "3/2"], "--shard is 3/2; it must be a number and a count"),
         (["--folds", "1"], "folds.*at least 2"),
         (["--folds", "17"], "32 pushes, 16 to divide by kind, do not fill 17 folds"),
         (["--group", "glass"], "no group 'glass'"),

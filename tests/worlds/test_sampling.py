@@ -6,7 +6,7 @@ import pytest
 from contracts.worlds import pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.errors import BadInput
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import pusher_gaps
 from sainet.worlds.config import WorldConfig
 from sainet.worlds.sampling import chunk_generator, draw
 

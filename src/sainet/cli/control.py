@@ -1,7 +1,8 @@
 """`sainet control`."""
 
 import shlex
-from contextlib import nullcontext
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,8 +11,9 @@ from sainet.cli.devices import use_cache
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.control.config import ControlConfig
 from sainet.runs.documents import read_json
+from sainet.runs.errors import require
+from sainet.runs.executors import Machines
 from sainet.runs.manifest import MANIFEST
-from sainet.runs.workers import worker_pool
 
 if TYPE_CHECKING:
     from sainet.control.record import EpisodeRecord
@@ -38,12 +40,13 @@ class Control:
     replay.html, a page that plays the first six episodes."""
     workers: int | None = None
     """Number of processes, which does not affect the result. Default: one per core."""
+    machines: Machines = field(default_factory=Machines)
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
-        """Run the trials and print their outcome."""
+        """Run the trials, or those of a shard, and print their outcome."""
         use_cache()
-        from sainet.control.trials import measure_trials, prepare, run_trials
+        from sainet.control.trials import measure_trials, prepare
         from sainet.evaluation.trials import trial_rows
         from sainet.planning.checks import doubts_of_training
         from sainet.report.figures.episodes import draw_episodes
@@ -54,20 +57,10 @@ class Control:
             self.output.warn(f"{config.model}: {doubt}.")
         if config.dry_run:
             return self._rehearse()
-        solved = 0
-        bar = progress_bar(f"Pushing ({config.model})", config.trials, self.output)
-        # A physical robot executes one episode after another.
-        pool = nullcontext() if config.is_physical else worker_pool(self.workers)
-        with pool as executor, bar as advance:
-
-            def on_episode(record: "EpisodeRecord") -> None:
-                nonlocal solved
-                solved += record.solved
-                advance(1, f"{solved} solved")
-
-            records = run_trials(
-                config, self.out, executor=executor, on_episode=on_episode
-            )
+        records = self._run_trials()
+        if (shard := self.machines.share) is not None:
+            self.output.say(f"The episodes of shard {shard} are in {self.out}")
+            return {"out": str(self.out), "shard": str(shard)}
         figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
         if self.animate:
             self._animate(records[:_DRAWN])
@@ -80,6 +73,38 @@ class Control:
             for name in ("model", "goals", "planner", *_PLACES[config.robot])
         }
         return names | row.to_dict() | {"episodes": str(self.out / "episodes")}
+
+    def _run_trials(self) -> list["EpisodeRecord"]:
+        """Return the records of all trials, or none of a shard."""
+        from sainet.control.trials import run_share, run_trials
+
+        config, shard, solved = self.config, self.machines.share, 0
+        total = len(shard.own(config.trials)) if shard else config.trials
+        bar = progress_bar(f"Pushing ({config.model})", total, self.output)
+        with self._executor() as executor, bar as advance:
+
+            def on_episode(record: "EpisodeRecord") -> None:
+                nonlocal solved
+                solved += record.solved
+                advance(1, f"{solved} solved")
+
+            if shard is not None:
+                run_share(
+                    config, self.out, shard, executor=executor, on_episode=on_episode
+                )
+                return []
+            return run_trials(
+                config, self.out, executor=executor, on_episode=on_episode
+            )
+
+    def _executor(self) -> AbstractContextManager[Executor | None]:
+        """Return what runs the trials: a physical robot one after another, here."""
+        if not self.config.is_physical:
+            return self.machines.executor(self.workers)
+        for name in ("scheduler", "shard"):
+            given = getattr(self.machines, name)
+            require(given is None, name, "left out with a physical robot", given)
+        return nullcontext()
 
     def _rehearse(self) -> Json:
         """Show the commands of the first push of every trial."""

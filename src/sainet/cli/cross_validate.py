@@ -1,6 +1,6 @@
 """`sainet cross-validate`."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +9,7 @@ from sainet.cli.output import Bars, Json, Output
 from sainet.datasets import Scheme
 from sainet.report import WRITERS
 from sainet.runs.errors import require, require_one_of
-from sainet.runs.workers import worker_pool
+from sainet.runs.executors import Machines
 from sainet.studies import USUAL_CANDIDATES, CandidateName
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class CrossValidate:
     """Pushes to use, from the start of the dataset (default: all)."""
     table: Path | None = None
     """File for the table: .md, .html, .tex or .csv (default: none)."""
+    machines: Machines = field(default_factory=Machines)
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -57,16 +58,27 @@ class CrossValidate:
         use_devices()
         from sainet.datasets.store import open_part
         from sainet.report.writers import print_table, write_table
-        from sainet.studies.cross_validation import candidates_named
+        from sainet.studies.cross_validation import candidates_named, cross_validated
         from sainet.studies.runner import Runner
+        from sainet.studies.shares import collected, run_share
         from sainet.studies.study import STEPS
         from sainet.studies.validation import cross_validate
 
         store = open_part(self.data, self.group, self.pushes)
         models = candidates_named(self.models)
-        with worker_pool(None, core_each=True) as pool, Bars(self.output) as bars:
+        parts, _ = cross_validated(store, self.by, self.folds, models)
+        given = {"by": self.by, "folds": self.folds, "models": self.models}
+        settings = {"command": "cross-validate", "data": store.content, **given}
+        shard = self.machines.share
+        executor = self.machines.executor(core_each=True)
+        with executor as pool, Bars(self.output) as bars:
             runner = Runner(self.out / STEPS, pool, bars)
-            found = cross_validate(store, self.by, self.folds, models, runner)
+            if shard is not None:
+                done = run_share(parts, self.out, settings, shard, runner)
+                self.output.say(done.in_words(shard))
+                return {"shard": str(shard), **asdict(done)}
+            with collected(parts, self.out, settings):
+                found = cross_validate(store, self.by, self.folds, models, runner)
         page = found.write(self.out, self.data)
         for sentence in found.coverage:
             self.output.say(sentence)

@@ -11,7 +11,7 @@ from sainet.cli.output import Json, Output, progress_bar
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.recorded.units import Units
 from sainet.runs.errors import BadInput, require
-from sainet.runs.workers import worker_pool
+from sainet.runs.executors import Machines
 from sainet.worlds.config import SetupName
 
 if TYPE_CHECKING:
@@ -38,20 +38,28 @@ class Generate:
     """Run folder to write; identical settings resume."""
     workers: int | None = None
     """Number of processes, which does not affect the result. Default: one per core."""
+    machines: Machines = field(default_factory=Machines)
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
-        """Generate the dataset."""
-        from sainet.datasets.generate import generate
+        """Generate the dataset, or the chunks of a shard."""
+        from sainet.datasets.generate import generate, generate_share
 
-        bar = progress_bar("Simulating", self.config.pushes, self.output)
-        with worker_pool(self.workers) as pool, bar as advance:
-            store = generate(
-                self.config,
-                self.out,
-                executor=pool,
-                on_pushes=lambda pushes: advance(pushes, ""),
-            )
+        shard = self.machines.share
+        total = None if shard else self.config.pushes
+        bar = progress_bar("Simulating", total, self.output)
+        with self.machines.executor(self.workers) as pool, bar as advance:
+
+            def report(pushes: int) -> None:
+                advance(pushes, "")
+
+            if shard is not None:
+                pushes = generate_share(
+                    self.config, self.out, shard, executor=pool, on_pushes=report
+                )
+                self.output.say(f"{pushes} pushes of shard {shard} are in {self.out}")
+                return {"out": str(self.out), "shard": str(shard), "pushes": pushes}
+            store = generate(self.config, self.out, executor=pool, on_pushes=report)
         self.output.say(f"{store.info.pushes} pushes are in {self.out}")
         return {"out": str(self.out), "pushes": store.info.pushes}
 

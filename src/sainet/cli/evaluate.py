@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.report import WRITERS
-from sainet.runs.errors import require_one_of
+from sainet.runs.errors import BadInput, require_one_of
+from sainet.runs.shards import Shard
 
 if TYPE_CHECKING:
     from sainet.datasets.store import Store
+    from sainet.evaluation.measurements import Measurements
+    from sainet.evaluation.parts import Parts
+    from sainet.models.model import Model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +40,13 @@ class Evaluate:
     """File for the table: .md, .html, .tex or .csv. Default: none."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
+    out: Path | None = None
+    """Run folder for the errors of each model: an identical call resumes. Default:
+    none."""
+    shard: str | None = None
+    """Share of the models to evaluate into the run folder, for example 3/8 for the
+    third of eight; the same command without a shard evaluates those that are missing
+    and prints the table. Default: all models."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -46,7 +57,6 @@ class Evaluate:
         from sainet.datasets.store import open_part
         from sainet.evaluation.as_json import to_json_object
         from sainet.evaluation.coverage import coverage_of, in_words, to_json
-        from sainet.evaluation.evaluate import evaluate
         from sainet.evaluation.summary import summarise
         from sainet.models.library import load_model, other_worlds
         from sainet.planning.checks import doubts_of_count
@@ -63,15 +73,9 @@ class Evaluate:
         for model in models:
             for doubt in doubts_of_count(model.card, store.info.bodies):
                 self.output.warn(f"{model.name}: {doubt}.")
-        total = store.info.pushes * len(models)
-        with progress_bar("Predicting", total, self.output) as advance:
-            measured = evaluate(
-                models,
-                store,
-                steps=self.steps,
-                force=self.force,
-                on_pushes=lambda model, pushes: advance(pushes, model),
-            )
+        if self.shard is not None:
+            return self._measure_share(models, store, Shard.parse(self.shard))
+        measured = self._measure(models, store)
         summary = summarise(measured)
         print_table(arrange(summary), self.output.console)
         covered = coverage_of(measured)
@@ -80,6 +84,61 @@ class Evaluate:
         if self.table is not None:
             write_table(arrange(summary), self.table)
         return to_json_object(summary) | to_json(covered)
+
+    def _measure(self, models: "list[Model]", store: "Store") -> "Measurements":
+        """Return the errors of all models, measured where that is missing."""
+        if self.out is None:
+            return self._evaluate(models, store, None)
+        parts = self._parts(self.out, models, store)
+        shards = parts.collect(models)
+        measured = self._evaluate(models, store, parts)
+        if shards is not None:
+            shards.clear()
+        return measured
+
+    def _measure_share(
+        self, models: "list[Model]", store: "Store", shard: Shard
+    ) -> Json:
+        """Measure the errors of the models of a shard."""
+        if self.out is None:
+            raise BadInput("`out` is missing; give the folder that all shards share.")
+        parts = self._parts(self.out, models, store, shared=True)
+        own = [models[index] for index in shard.own(len(models))]
+        with parts.share(shard) as share:
+            for model in own:
+                self._evaluate([model], store, parts)
+                share.add(model.name, [parts.file(model.name)])
+        self.output.say(f"Errors of {len(own)} models of shard {shard}: {self.out}")
+        return {"out": str(self.out), "shard": str(shard), "models": len(own)}
+
+    def _parts(
+        self,
+        out: Path,
+        models: "list[Model]",
+        store: "Store",
+        *,
+        shared: bool = False,
+    ) -> "Parts":
+        from sainet.evaluation.parts import Parts
+
+        settings = {"steps": self.steps, "engine": self.engine, "force": self.force}
+        return Parts.open(out, models, store, settings, shared=shared)
+
+    def _evaluate(
+        self, models: "list[Model]", store: "Store", parts: "Parts | None"
+    ) -> "Measurements":
+        from sainet.evaluation.evaluate import evaluate
+
+        total = store.info.pushes * len(models)
+        with progress_bar("Predicting", total, self.output) as advance:
+            return evaluate(
+                models,
+                store,
+                steps=self.steps,
+                force=self.force,
+                on_pushes=lambda model, pushes: advance(pushes, model),
+                parts=parts,
+            )
 
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit; warn of the others."""

@@ -1,8 +1,8 @@
 """`sainet reproduce`."""
 
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,8 @@ from sainet.cli.devices import use_devices
 from sainet.cli.help import message
 from sainet.cli.output import Bars, Json, Output
 from sainet.runs.errors import BadInput, MissingExtra
-from sainet.runs.workers import core_count, worker_pool
+from sainet.runs.executors import Machines
+from sainet.runs.workers import core_count
 from sainet.studies import Scale
 
 if TYPE_CHECKING:
@@ -49,15 +50,17 @@ class Reproduce:
     devices share each batch. Default: one per core, 1 on a GPU."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
+    machines: Machines = field(default_factory=Machines)
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
-        """Run the studies one after another."""
+        """Run the studies one after another, or the steps of a shard."""
         use_devices(self.devices)
         trainers = self._trainer_count()
+        shard = self.machines.share
         from sainet.studies import STUDIES, load_study
-        from sainet.studies.runner import Runner
-        from sainet.studies.study import STEPS, MissingInput, Scope
+        from sainet.studies.shares import collected, last_steps, run_share
+        from sainet.studies.study import MissingInput, Scope
 
         scope = Scope(self.scale, self.recorded)
         studies = {name: load_study(name) for name in self.studies or STUDIES}
@@ -70,19 +73,46 @@ class Reproduce:
                     raise
                 not_run[name] = message(error, type(self))
                 self.output.warn(f"{name} is not run: {not_run[name]}")
-        tables: dict[str, Json] = {}
-        with (
-            worker_pool(None) as pool,
-            _trainer_pool(trainers) as trainer_pool,
-            Bars(self.output) as bars,
-        ):
-            runner = Runner(self.out / STEPS, pool, bars, trainer_pool)
-            for name, study in studies.items():
-                if name not in not_run:
-                    tables[name] = self._answer(name, study, scope, runner)
+        studies = {name: s for name, s in studies.items() if name not in not_run}
+        steps = last_steps(study.plan(scope) for study in studies.values())
+        settings = self._settings(scope, studies)
+        with self._runner(trainers) as runner:
+            if shard is not None:
+                done = run_share(steps, self.out, settings, shard, runner)
+                self.output.say(done.in_words(shard))
+                return {"shard": str(shard), **asdict(done)}
+            with collected(steps, self.out, settings):
+                tables = {
+                    name: self._answer(name, study, scope, runner)
+                    for name, study in studies.items()
+                }
         if len(tables) == 1 and not not_run:
             return next(iter(tables.values()))
         return {"studies": tables, "not_run": not_run}
+
+    @contextmanager
+    def _runner(self, trainers: int) -> Iterator["Runner"]:
+        """Yield the runner of the steps, which trains several networks at once."""
+        from sainet.studies.runner import Runner
+        from sainet.studies.study import STEPS
+
+        machines, folder = self.machines, self.out / STEPS
+        with machines.executor() as pool, Bars(self.output) as bars:
+            if machines.scheduler is not None:
+                yield Runner(folder, pool, bars, pool)
+            elif trainers == 1:
+                yield Runner(folder, pool, bars)
+            else:
+                with machines.executor(trainers, core_each=True) as training:
+                    yield Runner(folder, pool, bars, training)
+
+    def _settings(
+        self, scope: "Scope", studies: Mapping[str, "Study"]
+    ) -> dict[str, object]:
+        """Return what all shards of a run have in common."""
+        pushes = self.recorded and scope.recorded_pushes().content
+        made = {"command": "reproduce", "scale": self.scale, "recorded": pushes}
+        return {**made, "studies": list(studies)}
 
     def _answer(
         self, name: str, study: "Study", scope: "Scope", runner: "Runner"
@@ -119,8 +149,3 @@ class Reproduce:
         if count > 1 and not is_cpu:
             raise BadInput(f"--trainers is {count}; on a GPU it must be 1.")
         return count
-
-
-def _trainer_pool(count: int) -> AbstractContextManager[Executor | None]:
-    """Return the processes that train in parallel; None for one at a time."""
-    return worker_pool(count, core_each=True) if count > 1 else nullcontext()

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import jax
@@ -31,6 +32,7 @@ from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
+from sainet.runs.shards import Shard, collect, open_share
 from sainet.runs.workers import each_done
 from sainet.scenes.scene import TIME_STEP
 
@@ -57,17 +59,55 @@ def run_trials(
     model, _ = prepare(config)  # report errors before any output
     settings = {"command": "control", "weights": model.digest, **config.settings()}
     folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
+    shards = None if folder.is_finished else collect(out, settings)
     files = [episode_file(out, trial) for trial in range(config.trials)]
     known = {index for index, path in enumerate(files) if path.is_file()}
     for index in sorted(known):
         on_episode(read_record(files[index]))
     missing = [(config, out, i) for i in range(config.trials) if i not in known]
+    if shards is not None:
+        shards.tell(len(missing), config.trials)
     for index in each_done(executor, run_trial, missing):
         on_episode(read_record(files[index]))
     records = [read_record(path) for path in files]
     names = [path.relative_to(out).as_posix() for path in files]
+    if shards is not None:
+        shards.clear()
     write_document(folder.path / SUMMARY, Finished(names))
     return records
+
+
+def run_share(
+    config: ControlConfig,
+    out: Path,
+    shard: Shard,
+    *,
+    executor: Executor | None = None,
+    on_episode: Callable[[EpisodeRecord], None] = lambda episode: None,
+) -> int:
+    """Run the trials of a shard, and return their number.
+
+    `run_trials` with equal arguments runs the missing ones and returns the records.
+
+    Raises:
+        RunConflict: the folder belongs to another run, or to shards of other versions.
+        BadInput: the model is for other pushes, or an episode is damaged.
+    """
+    model, _ = prepare(config)
+    settings = {"command": "control", "weights": model.digest, **config.settings()}
+    devices = jax.device_count()
+    folder = open_run(out, settings, finished_by=SUMMARY, devices=devices, shared=True)
+    own = shard.own(config.trials)
+    if folder.is_finished:
+        return len(own)
+    with open_share(out, settings, shard) as share:
+        known = [index for index in own if episode_file(out, index).is_file()]
+        missing = [(config, out, index) for index in own if index not in known]
+        for index in chain(known, each_done(executor, run_trial, missing)):
+            path = episode_file(out, index)
+            on_episode(read_record(path))
+            share.add(f"episode {index}", [path])
+    return len(own)
 
 
 def run_trial(config: ControlConfig, out: Path, index: int) -> int:

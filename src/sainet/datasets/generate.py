@@ -12,11 +12,12 @@ from sainet.datasets.batch import check_finite, from_trajectory
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
-from sainet.datasets.writer import write_once
+from sainet.datasets.writer import write_once, write_share
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import require
+from sainet.runs.shards import Shard
 from sainet.scenes.controls import Controls
 from sainet.scenes.quantities import PROPERTIES
 from sainet.scenes.scene import TIME_STEP, Scene
@@ -59,6 +60,42 @@ def generate(
         {"command": "generate", **asdict(config)},
         store_info(config),
         partial(simulate_chunk, config),
+        executor=executor,
+        on_pushes=on_pushes,
+    )
+
+
+def generate_share(
+    config: GenerateConfig,
+    out: Path,
+    shard: Shard,
+    *,
+    executor: Executor | None = None,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+) -> int:
+    """Simulate the chunks of a shard, and return the number of their pushes.
+
+    `generate` with equal settings finishes the dataset, whose bytes are those that it
+    would have without shards.
+
+    Args:
+        config: what to simulate.
+        out: the run folder that all shards share.
+        shard: whose chunks are simulated here.
+        executor: as of `generate`.
+        on_pushes: as of `generate`.
+
+    Raises:
+        SainetError: whatever `generate` raises.
+        RunConflict: the folder has shards of other settings or versions.
+    """
+    _check_possible(config)
+    return write_share(
+        out,
+        {"command": "generate", **asdict(config)},
+        store_info(config),
+        partial(simulate_chunk, config),
+        shard=shard,
         executor=executor,
         on_pushes=on_pushes,
     )

@@ -4,6 +4,7 @@ import logging
 import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -14,6 +15,7 @@ from sainet.datasets.store import Store, open_store
 from sainet.runs import documents
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
+from sainet.runs.shards import Collected, Shard, check_files, collect, open_share
 from sainet.runs.workers import each_done
 
 PROGRESS = "progress"
@@ -51,8 +53,43 @@ def write_once(
         _log.info("%s is finished already", out)
         _clear_progress(out)
     else:
-        _write(out, info, make_chunk, executor, on_pushes)
+        shards = collect(out, settings)
+        _write(out, info, make_chunk, executor, on_pushes=on_pushes, shards=shards)
     return open_store(out)
+
+
+def write_share(
+    out: Path,
+    settings: Mapping[str, object],
+    info: schema.StoreInfo,
+    make_chunk: MakeChunk,
+    *,
+    shard: Shard,
+    executor: Executor | None = None,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+) -> int:
+    """Write the chunks of a shard, and return the number of their pushes.
+
+    `write_once` with equal arguments finishes the store.
+
+    Raises:
+        RunConflict: the folder belongs to another run, or to shards of other versions.
+        BadInput: the disk is full.
+    """
+    folder = open_run(out, settings, finished_by=schema.HASHES, shared=True)
+    own = shard.own(info.chunks)
+    pushes = sum(map(info.chunk_length, own))
+    if folder.is_finished:
+        on_pushes(pushes)
+        return pushes
+    with open_share(out, settings, shard):  # its lists: the receipts of the chunks
+        _create_arrays(out, info)
+        missing = [index for index in own if not _is_written(out, info, index)]
+        on_pushes(pushes - sum(map(info.chunk_length, missing)))
+        jobs = [(out, info, index, make_chunk) for index in missing]
+        for index in each_done(executor, write_chunk, jobs):
+            on_pushes(info.chunk_length(index))
+    return pushes
 
 
 def derive(
@@ -93,7 +130,7 @@ def write_store(folder: Path, info: schema.StoreInfo, arrays: schema.Arrays) -> 
     def part(index: int) -> schema.Arrays:
         return {name: a[info.chunk_slice(index)] for name, a in arrays.items()}
 
-    _write(folder, info, part, None, lambda pushes: None)
+    _write(folder, info, part, None)
 
 
 def _write(
@@ -101,11 +138,17 @@ def _write(
     info: schema.StoreInfo,
     make_chunk: MakeChunk,
     executor: Executor | None,
-    on_pushes: Callable[[int], None],
+    *,
+    on_pushes: Callable[[int], None] = lambda pushes: None,
+    shards: Collected | None = None,
 ) -> None:
     """Write the missing chunks, then the list of all hashes, which completes it."""
     _create_arrays(folder, info)
+    if shards is not None:
+        _check_unchanged(folder, info)
     missing = missing_chunks(folder, info)
+    if shards is not None:
+        shards.tell(len(missing), info.chunks)
     on_pushes(info.pushes - sum(map(info.chunk_length, missing)))
     jobs = [(folder, info, index, make_chunk) for index in missing]
     for index in each_done(executor, write_chunk, jobs):
@@ -116,33 +159,48 @@ def _write(
     for path in sorted((folder / schema.ARRAYS).rglob("zarr.json")):
         name = path.relative_to(folder / schema.ARRAYS).as_posix()
         hashes[name] = documents.content_hash(path.read_bytes())
+    if shards is not None:  # before the last file: an interruption here loses nothing
+        shards.clear()
     documents.write_document(folder / schema.HASHES, schema.Listing(files=hashes))
     _clear_progress(folder)
+
+
+def _check_unchanged(folder: Path, info: schema.StoreInfo) -> None:
+    """Raise `BadInput` for a chunk that was changed after its receipt was written."""
+    for index in range(info.chunks):
+        if (path := _receipt(folder, index)).is_file():
+            files = documents.read_document(path, schema.Listing).files
+            check_files(folder / schema.ARRAYS, files)
 
 
 def _create_arrays(folder: Path, info: schema.StoreInfo) -> None:
     """Create the empty arrays of a store; repeated calls give the same bytes."""
     import zarr
     from zarr.codecs import ZstdCodec
+    from zarr.errors import ContainsArrayError, ContainsGroupError
 
     attributes = msgspec.to_builtins(documents.checked(info, folder))
     try:
-        group = zarr.open_group(folder / schema.ARRAYS, mode="a", attributes=None)
+        try:
+            group = zarr.open_group(folder / schema.ARRAYS, mode="a", attributes=None)
+        except ContainsGroupError:  # another shard was faster
+            group = zarr.open_group(folder / schema.ARRAYS, mode="r+")
         group.attrs.put(attributes)
         for name, variable in schema.variables(info).items():
             if name in group:
                 continue
-            group.create_array(
-                name,
-                shape=variable.shape(info),
-                chunks=variable.chunk_shape(info),
-                dtype=variable.dtype,
-                fill_value=np.nan if variable.dtype is np.float32 else 0,
-                compressors=ZstdCodec(level=1),
-                dimension_names=variable.dimensions,
-                attributes={"units": variable.units, "long_name": variable.meaning},
-                config={"write_empty_chunks": True},
-            )
+            with suppress(ContainsArrayError):  # another shard was faster
+                group.create_array(
+                    name,
+                    shape=variable.shape(info),
+                    chunks=variable.chunk_shape(info),
+                    dtype=variable.dtype,
+                    fill_value=np.nan if variable.dtype is np.float32 else 0,
+                    compressors=ZstdCodec(level=1),
+                    dimension_names=variable.dimensions,
+                    attributes={"units": variable.units, "long_name": variable.meaning},
+                    config={"write_empty_chunks": True},
+                )
     except OSError as error:
         raise documents.write_error(folder / schema.ARRAYS, error) from error
 

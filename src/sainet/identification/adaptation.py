@@ -29,8 +29,7 @@ from sainet.models.wrappers import OffsetCamera
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import PathControls
 from sainet.scenes.recording import Recording
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.scene import Scene, pair_gaps
 from sainet.scenes.state import State, at_rest
 
 REMEMBERED = 24  # pushes: older ones are forgotten, because surfaces change

@@ -14,8 +14,7 @@ from jaxtyping import Array, Float
 
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import direction, rotate
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State
 
 

@@ -10,8 +10,7 @@ from sainet.models.dynamics import AbstractDynamics
 from sainet.models.process_card import ProcessCard
 from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import Push, PushGrid
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.scene import Scene, pair_gaps
 from sainet.scenes.state import State, check_state
 
 _DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise

@@ -15,8 +15,7 @@ from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.expectation import mean_over
 from sainet.runs.errors import Diverged
 from sainet.scenes.pushes import Push, PushGrid, command_path, place_pusher
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, Trajectory, at_rest
 from sainet.tasks.push_to_goal import AbstractTask
 

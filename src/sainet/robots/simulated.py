@@ -13,8 +13,7 @@ from sainet.robots import RobotConfig
 from sainet.robots.base import AbstractRobot
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest, in_a_row
 from sainet.worlds.config import WorldConfig, bounds
 from sainet.worlds.noise import NoiseConfig, at_level

@@ -71,6 +71,20 @@ def write_json(path: Path, value: object) -> None:
     write_bytes(path, to_json(value).encode())
 
 
+def write_first(path: Path, value: object) -> None:
+    """Write a JSON file atomically, unless another process has written it by then."""
+    staged = path.with_name(f".{path.name}.{uuid.uuid4().hex}.first.partial")
+    write_json(staged, value)
+    try:
+        os.link(staged, path)
+    except FileExistsError:
+        pass
+    except OSError:  # a file system without hard links
+        os.replace(staged, path)
+    finally:
+        staged.unlink(missing_ok=True)
+
+
 @contextmanager
 def readable(path: Path, error: type[BadInput] = BadInput) -> Iterator[None]:
     """Raise an error in one line if a path cannot be inspected.

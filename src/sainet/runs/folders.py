@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary, finalize
 
+import msgspec
+
 from sainet.runs import documents
 from sainet.runs.errors import RunConflict, shown
 from sainet.runs.manifest import MANIFEST, Manifest, manifest
@@ -19,7 +21,7 @@ except ImportError:  # without POSIX, folders are not locked
 
 
 class FolderLock:
-    """Exclusive lock on a folder.
+    """Lock on a folder, exclusive or shared by shards.
 
     It is released with its last reference and with the process, even by `kill -9`.
     """
@@ -29,32 +31,37 @@ class FolderLock:
         finalize(self, os.close, descriptor)
 
 
-_held: WeakValueDictionary[str, FolderLock] = WeakValueDictionary()
+_held: WeakValueDictionary[tuple[str, bool], FolderLock] = WeakValueDictionary()
 
 
-def lock_folder(folder: Path) -> FolderLock | None:
+def lock_folder(folder: Path, *, shared: bool = False) -> FolderLock | None:
     """Return the lock of a folder, or None if the system has no locks.
 
     A lock that this process already holds is returned again, for example after an
     exception whose traceback keeps it.
 
+    Args:
+        folder: the folder.
+        shared: whether other processes may hold a shared lock of it meanwhile.
+
     Raises:
         BlockingIOError: another process holds the lock.
     """
     place = os.path.realpath(folder)
-    if (known := _held.get(place)) is not None:
+    if (known := _held.get((place, shared))) is not None:
         return known
     if fcntl is None:
         return None
     descriptor = os.open(place, os.O_RDONLY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
     except OSError as error:
         os.close(descriptor)
         if isinstance(error, BlockingIOError):
             raise
         return None  # the file system has no locks
-    lock = _held[place] = FolderLock(descriptor)
+    lock = _held[place, shared] = FolderLock(descriptor)
     return lock
 
 
@@ -77,7 +84,12 @@ class RunFolder:
 
 
 def open_run(
-    path: Path, config: Mapping[str, Any], *, finished_by: str, devices: int = 0
+    path: Path,
+    config: Mapping[str, Any],
+    *,
+    finished_by: str,
+    devices: int = 0,
+    shared: bool = False,
 ) -> RunFolder:
     """Return a new run folder, or the existing one with the same settings.
 
@@ -86,6 +98,7 @@ def open_run(
         config: the settings that determine the output, as JSON values.
         finished_by: the file, relative to the folder, that the run writes last.
         devices: number of JAX devices, if the output depends on it.
+        shared: whether other processes may work in the folder, each at its own part.
 
     Raises:
         RunConflict: the folder belongs to another run, or another process uses it;
@@ -96,26 +109,29 @@ def open_run(
     with documents.readable(path, RunConflict):
         _check_free(path, wanted)
     try:
-        folder = replace(folder, lock=_lock(path))
+        folder = replace(folder, lock=_lock(path, shared))
     except RunConflict:
         if folder.is_finished:  # nothing remains to be written
             return folder
         raise
-    for leftover in path.glob(".*.partial"):
+    # Another shard may be writing what looks like a leftover.
+    for leftover in () if shared else path.glob(".*.partial"):
         if not leftover.is_dir():
             leftover.unlink(missing_ok=True)
     if not (path / MANIFEST).exists():
-        documents.write_document(path / MANIFEST, manifest(devices))
+        made = msgspec.to_builtins(manifest(devices))
+        documents.write_first(path / MANIFEST, made)
     if not (path / CONFIG).exists():
-        documents.write_json(path / CONFIG, wanted)
+        documents.write_first(path / CONFIG, wanted)
+        _check_free(path, wanted)  # a shard of other settings may have been first
     return folder
 
 
-def _lock(path: Path) -> FolderLock | None:
+def _lock(path: Path, shared: bool) -> FolderLock | None:
     """Return the lock of the folder, which is created if missing."""
     try:
         path.mkdir(parents=True, exist_ok=True)
-        return lock_folder(path)
+        return lock_folder(path, shared=shared)
     except BlockingIOError:
         raise RunConflict(
             f"{path}: another sainet process is using this folder; wait for it, or "

@@ -61,6 +61,11 @@ def remember_interrupt() -> None:
     _interrupts.have_come = True
 
 
+def forget_interrupts() -> None:
+    """Forget what has come; for a job that begins after another one was ended."""
+    _interrupts.have_come = False
+
+
 def _interrupt(number: int, frame: object) -> None:
     remember_interrupt()
     raise KeyboardInterrupt

@@ -49,6 +49,12 @@ def manifest(devices: int = 0) -> Manifest:
     )
 
 
+def code_versions() -> dict[str, str | None]:
+    """Return what results may depend on: versions of packages, and the commit."""
+    found = {name: _version(name) for name in _PACKAGES}
+    return {**found, "git_commit": _git_commit()}
+
+
 def _version(name: str) -> str | None:
     try:
         return metadata.version(name)
@@ -92,3 +98,16 @@ def cache_folder() -> Path:
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     machine = f"{processor()} {platform.machine()}"
     return Path(home) / "sainet" / content_hash(machine.encode())[:12]
+
+
+def use_cache() -> None:
+    """Keep what JAX compiles, for this process and those it starts.
+
+    JAX's own variables take precedence.
+    """
+    settings = {
+        "JAX_COMPILATION_CACHE_DIR": str(cache_folder()),
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": str(WORTH_KEEPING),
+    }
+    for name, value in settings.items():
+        os.environ.setdefault(name, value)

@@ -1,4 +1,4 @@
-"""Static properties of disks on a table and of the pusher.
+"""Static properties of disks on a table and of the pusher, and gaps between them.
 
 Units are metres, radians, kilograms and seconds, in the table frame. Leading batch axes
 are optional; there is at least one disk.
@@ -133,3 +133,23 @@ def check_scene(scene: Scene, source: str = "scene") -> None:
         where = f"{source}: {name}"
         quantity.check(getattr(scene, name), where, error=BadScene)
     TIME_STEP_RANGE.check(scene.time_step, f"{source}: time_step", error=BadScene)
+
+
+def pair_gaps(scene: Scene, state: State) -> Float[Array, "*batch body body"]:
+    """Return the gaps between the surfaces of disks (m), negative for overlaps.
+
+    The diagonal is infinite.
+    """
+    offset = state.position[..., :, None, :] - state.position[..., None, :, :]
+    squared = jnp.sum(offset**2, axis=-1)
+    itself = jnp.broadcast_to(jnp.eye(scene.body_count, dtype=bool), squared.shape)
+    distance = jnp.sqrt(jnp.where(itself, 1.0, squared))
+    reach = scene.radius[..., :, None] + scene.radius[..., None, :]
+    return jnp.where(itself, jnp.inf, distance - reach)
+
+
+def pusher_gaps(scene: Scene, state: State) -> Float[Array, "*batch body"]:
+    """Return the gaps between the pusher and each disk (m), negative for overlaps."""
+    offset = state.position - state.pusher_position[..., None, :]
+    distance = jnp.sqrt(jnp.sum(offset**2, axis=-1))
+    return distance - scene.radius - scene.pusher_radius[..., None]

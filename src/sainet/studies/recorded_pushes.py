@@ -15,9 +15,9 @@ import numpy as np
 from sainet.datasets.splits import Fold, fold_of_push, make_folds
 from sainet.datasets.store import Store
 from sainet.evaluation.claims import Claim, errs_less
-from sainet.evaluation.evaluate import EndOffsets, end_offsets
 from sainet.evaluation.joining import add_models, join_folds, without_predictions
 from sainet.evaluation.measurements import Condition, Measurements
+from sainet.evaluation.predictions import EndOffsets, end_offsets
 from sainet.models.identity import Features, ModelKind
 from sainet.models.model import Model
 from sainet.studies.recorded_models import (

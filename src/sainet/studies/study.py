@@ -10,8 +10,8 @@ from sainet.datasets.store import Store, open_store
 from sainet.engines import make_engine
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.claims import Claim
-from sainet.evaluation.evaluate import EndOffsets
 from sainet.evaluation.measurements import Measurements, PublishedValues
+from sainet.evaluation.predictions import EndOffsets
 from sainet.evaluation.rulings import rule_on
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import CARD, WEIGHTS, read_card

@@ -8,8 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from sainet.runs.errors import BadInput
 from sainet.scenes.pushes import Push, place_pusher
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest, in_a_row
 from sainet.worlds.config import OfDisks, Range, WorldConfig
 

@@ -24,8 +24,7 @@ from sainet.robots.simulated import (
 )
 from sainet.scenes.controls import Controls
 from sainet.scenes.pushes import Push
-from sainet.scenes.scene import FrictionField, Scene
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import FrictionField, Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest
 from sainet.tasks.push_to_goal import draw_goal
 from sainet.worlds.noise import (

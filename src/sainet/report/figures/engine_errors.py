@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from sainet.evaluation.evaluate import EndOffsets
+from sainet.evaluation.predictions import EndOffsets
 from sainet.report.figures.canvas import add_grid, house_look, new_figure, save
 from sainet.report.palette import INK, MOVED, PUSHED
 

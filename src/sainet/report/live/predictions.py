@@ -13,8 +13,7 @@ from sainet.models.library import Model
 from sainet.planning.base import predicted_path
 from sainet.report.live.messages import BadMessage
 from sainet.scenes.pushes import Push, PushGrid, place_pusher
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pusher_gaps
+from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest
 
 _GRID = PushGrid()

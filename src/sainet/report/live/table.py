@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.report.live.messages import BadMessage
-from sainet.scenes.scene import Scene
-from sainet.scenes.shapes import pair_gaps
+from sainet.scenes.scene import Scene, pair_gaps
 from sainet.scenes.state import State, at_rest
 
 _BEHIND, _AHEAD, _HALF_WIDTH = 0.2, 0.44, 0.26  # m, from disk 1 in a row

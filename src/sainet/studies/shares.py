@@ -1,0 +1,188 @@
+"""Steps of studies divided among shards, each of which runs those that it can.
+
+A step belongs to one shard. A shard runs its steps whose inputs exist, until those that
+remain wait for other shards; run again, it goes on.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sainet.datasets.schema import ARRAYS
+from sainet.runs.shards import Shard, Share, collect, files_in, open_share
+from sainet.studies.expected_cost import FitProcess
+from sainet.studies.fine_tuning import Record
+from sainet.studies.runner import Runner
+from sainet.studies.simulated_control import RunTrials
+from sainet.studies.steps import (
+    Apart,
+    Derive,
+    Identify,
+    Simulate,
+    Step,
+    Train,
+    WithBystander,
+)
+from sainet.studies.study import Plan
+
+# Steps whose results are kept in run folders. All others are made in memory, quickly.
+KEPT = (
+    *(Apart, Derive, FitProcess, Identify, Record, RunTrials, Simulate, Train),
+    WithBystander,
+)
+
+
+class Several(Step[None]):
+    """Several steps, of which networks and folds are fitted at once."""
+
+    parts: tuple[Step[Any], ...]
+
+    def run(self, runner: Runner) -> None:
+        """Return nothing: the results are in the folders of the parts."""
+
+
+@dataclass(frozen=True)
+class Shared:
+    """How far the steps of a shard are."""
+
+    done: int
+    waiting: int  # for steps of other shards
+
+    def in_words(self, shard: Shard) -> str:
+        """Return the outcome in a sentence."""
+        if not self.waiting:
+            return f"Shard {shard} has finished its {self.done} steps."
+        return (
+            f"Shard {shard} has finished {self.done} of its {self.done + self.waiting} "
+            "steps; the others need steps of other shards: run the shards again, or "
+            "the command without a shard."
+        )
+
+
+def last_steps(plans: Iterable[Plan]) -> Iterator[Step[Any]]:
+    """Yield the steps that studies ask for; all others are inputs of these."""
+    for plan in plans:
+        yield from (plan.measured, *plan.networks, *plan.engine_errors.values())
+        if plan.as_trained is not None:
+            yield plan.as_trained
+
+
+def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
+    """Return all steps with run folders, by their keys: inputs before what needs them.
+
+    The order depends only on the steps, so that all shards count them alike.
+    """
+    found: dict[str, Step[Any]] = {}
+    for step in lasts:
+        for each in _needed(step, set()):
+            found.setdefault(each.key, each)
+    return {key: step for key, step in found.items() if isinstance(step, KEPT)}
+
+
+def _needed(step: Step[Any], seen: set[str]) -> Iterator[Step[Any]]:
+    """Yield a step after all that it needs, each once."""
+    if step.key in seen:
+        return
+    seen.add(step.key)
+    for each in step.inputs:
+        yield from _needed(each, seen)
+    yield step
+
+
+def _nearest_kept(step: Step[Any]) -> Iterator[Step[Any]]:
+    """Yield the steps with run folders that a step needs, directly or by way of others.
+
+    What those need in turn is finished with them.
+    """
+    for each in step.inputs:
+        if isinstance(each, KEPT):
+            yield each
+        else:
+            yield from _nearest_kept(each)
+
+
+def divided(steps: Mapping[str, Step[Any]], shard: Shard) -> list[Step[Any]]:
+    """Return the steps of a shard.
+
+    The steps of a fold need each other in turn: they belong to one shard, which need
+    not wait for others.
+    """
+    index: dict[str, int] = {}
+    count = 0
+    for key, step in steps.items():
+        before = [
+            index[each.key]
+            for each in _nearest_kept(step)
+            if isinstance(step, Apart) and isinstance(each, Apart)
+        ]
+        index[key] = before[0] if before else count
+        count += not before
+    return [step for key, step in steps.items() if shard.takes(index[key])]
+
+
+def run_share(
+    lasts: Iterable[Step[Any]],
+    out: Path,
+    settings: Mapping[str, object],
+    shard: Shard,
+    runner: Runner,
+) -> Shared:
+    """Run the steps of a shard whose inputs exist.
+
+    Args:
+        lasts: the steps that are asked for.
+        out: folder of the command, which contains those of the runner.
+        settings: of the command, equal for all shards.
+        shard: whose steps are run.
+        runner: of the steps.
+
+    Raises:
+        SainetError: whatever a step raises.
+        RunConflict: the folder has shards of other settings or versions.
+    """
+    own = divided(kept_steps(lasts), shard)
+    with open_share(out, settings, shard) as share:
+        while ready := _ready(own, share):
+            runner.result(Several(tuple(ready)))
+            for step in ready:
+                files = files_in(runner.folder(step), without=(ARRAYS,))
+                share.add(step.folder_name, files)
+        finished = share.finished()
+    done = sum(step.folder_name in finished for step in own)
+    return Shared(done, len(own) - done)
+
+
+def _ready(own: Iterable[Step[Any]], share: Share) -> list[Step[Any]]:
+    """Return the next step that can run, with all others that can run at its side."""
+    finished = share.finished()
+    ready = [
+        step
+        for step in own
+        if step.folder_name not in finished
+        and all(each.folder_name in finished for each in _nearest_kept(step))
+    ]
+    for kind in (Train, Apart):
+        if ready and isinstance(ready[0], kind):
+            return [step for step in ready if isinstance(step, kind)]
+    return ready[:1]
+
+
+@contextmanager
+def collected(
+    lasts: Iterable[Step[Any]], out: Path, settings: Mapping[str, object]
+) -> Iterator[None]:
+    """Check what shards have finished, if any; the body makes what is missing.
+
+    Raises:
+        RunConflict: the shards have other settings or versions, or one is at work.
+        BadInput: a file was changed after a shard had finished it.
+    """
+    shards = collect(out, settings)
+    if shards is not None:
+        names = [step.folder_name for step in kept_steps(lasts).values()]
+        shards.tell(sum(name not in shards.pieces for name in names), len(names))
+    yield
+    if shards is not None:
+        shards.clear()
