@@ -14,6 +14,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+# Before the first import of numpy. The threads of OpenBLAS wait in a loop: with two
+# workers on two cores, small products of matrices take three times the processor time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import jax
 import pytest
 from jaxtyping import install_import_hook

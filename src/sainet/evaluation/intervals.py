@@ -76,7 +76,9 @@ class Sample:
         if pushes < 2:  # noqa: PLR2004  (one push has no spread)
             return np.full((RESAMPLES, quantities), np.nan), None, trainings
         shares = _shares(pushes) if self.folds is None else _shares_of_folds(self.folds)
-        by_training = np.stack([shares @ one for one in whole])
+        # One product for all training runs: the shares are most of what it reads.
+        together = shares @ np.moveaxis(whole, 0, 1).reshape(pushes, -1)
+        by_training = together.reshape(RESAMPLES, trainings, quantities).swapaxes(0, 1)
         mean = by_training.mean(axis=0)
         if trainings == 1:
             return mean, None, trainings
