@@ -22,6 +22,7 @@ import jax
 import pytest
 from jaxtyping import install_import_hook
 
+import checks
 from support import REPOSITORY, require
 
 # The workers of a run and the commands that they start compile the same things; what
@@ -54,7 +55,8 @@ HEAVY = (
 for name in HEAVY:
     if find_spec(name.partition(".")[0]):
         import_module(name)
-# Every annotated shape and type of the package is checked while the tests run.
+# Annotated shapes and types of the package are checked while the tests run.
+checks.install()
 install_import_hook("sainet", "support.typechecker")
 
 
@@ -79,6 +81,11 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 50, 100)
+
+
+def pytest_runtest_setup() -> None:
+    """Check the first calls of every function in each test."""
+    checks.begin_test()
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -46,7 +46,7 @@ def tiny_labs(monkeypatch):
     require(find_spec("mujoco"), "MuJoCo is not installed")
     sizes = {"quick": Sizes(2, 6, 4, 2, 2, (2, 4))}
     monkeypatch.setattr(lab_pushes, "SIZES", sizes)
-    monkeypatch.setattr(lab_control, "TRIALS", {"quick": (1, 2)})
+    monkeypatch.setattr(lab_control, "TRIALS", {"quick": (1, 1)})
     monkeypatch.setattr("sainet.studies.paper_setup._QUICK_ITERATIONS", 1)
 
 

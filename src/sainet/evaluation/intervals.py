@@ -20,7 +20,7 @@ from functools import cached_property, lru_cache
 import msgspec
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 RESAMPLES = 2000
 _SEED = 0
@@ -45,7 +45,7 @@ class Folds:
         if not self.are_labs or count == 1:
             return 1.0
         high = _ENDS[1] / 100
-        return float(t.ppf(high, count - 1) / norm.ppf(high)) * (1 - 1 / count) ** -0.5
+        return float(stdtrit(count - 1, high) / ndtri(high)) * (1 - 1 / count) ** -0.5
 
 
 @dataclass(frozen=True, eq=False)
