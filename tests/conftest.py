@@ -8,6 +8,7 @@ pyproject.toml.
 import gc
 import os
 import shutil
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
@@ -55,6 +56,10 @@ HEAVY = (
 for name in HEAVY:
     if find_spec(name.partition(".")[0]):
         import_module(name)
+# What the hook and pytest compile from source is kept where it disturbs nobody, also if
+# the environment forbids bytecode: half of the time of collecting, in every worker.
+sys.dont_write_bytecode = False
+sys.pycache_prefix = str(REPOSITORY / ".pytest_cache" / "bytecode")
 # Annotated shapes and types of the package are checked while the tests run.
 checks.install()
 install_import_hook("sainet", "support.typechecker")
