@@ -8,16 +8,22 @@ pyproject.toml.
 import gc
 import os
 import shutil
+import sys
 from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+# Before the first import of numpy. The threads of OpenBLAS wait in a loop: with two
+# workers on two cores, small products of matrices take three times the processor time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import jax
 import pytest
 from jaxtyping import install_import_hook
 
+import checks
 from support import REPOSITORY, require
 
 # The workers of a run and the commands that they start compile the same things; what
@@ -50,7 +56,12 @@ HEAVY = (
 for name in HEAVY:
     if find_spec(name.partition(".")[0]):
         import_module(name)
-# Every annotated shape and type of the package is checked while the tests run.
+# What the hook and pytest compile from source is kept where it disturbs nobody, also if
+# the environment forbids bytecode: half of the time of collecting, in every worker.
+sys.dont_write_bytecode = False
+sys.pycache_prefix = str(REPOSITORY / ".pytest_cache" / "bytecode")
+# Annotated shapes and types of the package are checked while the tests run.
+checks.install()
 install_import_hook("sainet", "support.typechecker")
 
 
@@ -75,6 +86,11 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(100_000, 50, 100)
+
+
+def pytest_runtest_setup() -> None:
+    """Check the first calls of every function in each test."""
+    checks.begin_test()
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -173,6 +173,15 @@ def pushes(tmp_path_factory):
     return out
 
 
+def test_what_a_command_compiles_is_kept(tmp_path):
+    cache = tmp_path / "cache"
+    keep = {"JAX_COMPILATION_CACHE_DIR": str(cache)}
+    keep["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+    words = ("generate", "robot", "--pushes", 1, "--stroke-mm", 2, "--hold-steps", 1)
+    sainet_alone(*words, "--workers", 1, "--quiet", "--out", tmp_path / "x", **keep)
+    assert list(cache.rglob("*-cache"))
+
+
 def test_equal_settings_do_nothing_and_others_are_refused(pushes):
     before = {p: p.stat().st_mtime_ns for p in pushes.rglob("*")}
     sainet("generate", "robot", *SMALL, "--out", pushes)
@@ -220,12 +229,10 @@ def test_shipped_networks_are_compared_where_they_fit(pushes):
 
 @pytest.mark.slow
 def test_control(tmp_path):
-    out, cache = tmp_path / "out", tmp_path / "cache"
-    keep = {"JAX_COMPILATION_CACHE_DIR": str(cache)}
-    keep["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+    out = tmp_path / "out"
     words = ("control", "--model", "physics", "--trials", 2, "--pushes", 1)
     words += ("--goals", "hard", "--animate", "--out", out, "--json", "--quiet")
-    done = sainet_alone(*words, **keep)
+    done = sainet_alone(*words)
     result = json.loads(done.stdout.splitlines()[-1])
     named = {name: result[name] for name in ("model", "goals", "planner", "world")}
     assert list(named.values()) == ["physics", "hard", "greedy", "planar"]
@@ -235,7 +242,6 @@ def test_control(tmp_path):
     names = {"median_pushes", "median_decision_s", "within_4_mm", "episodes"}
     assert names <= result.keys()
     assert len(list(Path(result["episodes"]).glob("*.json"))) == 2
-    assert list(cache.rglob("*-cache"))  # what was compiled is kept
     for name in ("episodes.svg", "episode-000.mp4", "replay.html"):
         assert (out / name).stat().st_size > 0
     command = "sainet control --model physics --goals hard --trials 2 --pushes 1"

@@ -74,3 +74,12 @@ def test_ratios_of_labs_are_positive_and_paired():
     other = Sample(rng.uniform(1, 2, (20, 1)), labs)
     value, low, high = Sample(one[:, None], labs).over(other)
     assert 0 < low[0] < value[0] < high[0]
+
+
+def test_quantities_and_training_runs_stay_apart():
+    values = np.random.default_rng(6).normal(size=(3, 40, 2)) * [1, 100] + [0, 500]
+    both = Sample(values).interval
+    for quantity in (0, 1):
+        alone = Sample(values[..., quantity : quantity + 1]).interval
+        for one, other in zip(both, alone, strict=True):
+            assert one[quantity] == pytest.approx(other[0])

@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -99,7 +100,10 @@ def test_the_models_of_a_fold_were_fitted_to_its_training_pushes(
         assert seen == card.trained_pushes < PUSHES / 2
 
 
-def test_an_identical_command_fits_nothing_again(printed, command, capsys):
+def test_an_identical_command_fits_nothing_again(printed, command, capsys, monkeypatch):
+    # Nothing is left to do that is worth the start of processes.
+    pool = "sainet.runs.executors.worker_pool"
+    monkeypatch.setattr(pool, lambda *_, **__: ThreadPoolExecutor(1))
     steps = command[1] / "steps"
     before = {p: p.stat().st_mtime_ns for p in steps.rglob("*") if p.is_file()}
     assert run(command[0]) == 0

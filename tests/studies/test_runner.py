@@ -194,12 +194,12 @@ def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
 
 def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):
     step = networks(store)
-    with worker_pool(2) as trainers:
+    with worker_pool(1) as trainers:
         runner = Runner(tmp_path, trainers=trainers)
-        folder = runner.folder(step.networks[1])
+        folder = runner.folder(step.networks[0])
         folder.mkdir()
         (folder / "config.json").write_text("{}")
-        with pytest.raises(RunConflict, match="in-seed-4"):
+        with pytest.raises(RunConflict, match="in-seed-3"):
             runner.result(step)
 
 

@@ -20,7 +20,7 @@ from functools import cached_property, lru_cache
 import msgspec
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 RESAMPLES = 2000
 _SEED = 0
@@ -45,7 +45,7 @@ class Folds:
         if not self.are_labs or count == 1:
             return 1.0
         high = _ENDS[1] / 100
-        return float(t.ppf(high, count - 1) / norm.ppf(high)) * (1 - 1 / count) ** -0.5
+        return float(stdtrit(count - 1, high) / ndtri(high)) * (1 - 1 / count) ** -0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,9 @@ class Sample:
         if pushes < 2:  # noqa: PLR2004  (one push has no spread)
             return np.full((RESAMPLES, quantities), np.nan), None, trainings
         shares = _shares(pushes) if self.folds is None else _shares_of_folds(self.folds)
-        by_training = np.stack([shares @ one for one in whole])
+        # One product for all training runs: the shares are most of what it reads.
+        together = shares @ np.moveaxis(whole, 0, 1).reshape(pushes, -1)
+        by_training = together.reshape(RESAMPLES, trainings, quantities).swapaxes(0, 1)
         mean = by_training.mean(axis=0)
         if trainings == 1:
             return mean, None, trainings

@@ -6,7 +6,6 @@ from itertools import combinations
 import msgspec
 import numpy as np
 from jaxtyping import Bool
-from scipy.stats import binomtest
 
 from sainet.evaluation.measurements import Condition, Measurements
 
@@ -87,6 +86,8 @@ def _row(measured: Measurements, slug: str, condition: Condition) -> TrialRow:
     seconds = column("decision_s")
     seconds = seconds[np.isfinite(seconds)]
     median = float(np.median(column("final_mm")))
+    from scipy.stats import binomtest  # slow to import
+
     interval = binomtest(int(solved.sum()), len(solved)).proportion_ci(method="wilson")
     pushes = column("pushes")[solved]
     return TrialRow(
@@ -119,6 +120,8 @@ def reached(
 
 
 def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
+    from scipy.stats import binomtest
+
     tried = [s for s in measured.slugs if was_tried(measured, s, condition)]
     for measure in MEASURES:
         found = {s: reached(measured, s, condition, measure) for s in tried}

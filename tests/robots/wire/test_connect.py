@@ -2,19 +2,18 @@
 
 import io
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from robots.wire.emulated_table import EmulatedTable
-from robots.wire.emulated_tracker import EmulatedTracker, free_port
+from robots.wire.disks_beneath import EVERY, disks_beneath
+from robots.wire.emulated_tracker import free_port
 from robots.wire.real_controller import RealController
 from sainet.cli.entry import run
 from sainet.control.collect import SUMMARY, collect, push_file, summary_of
@@ -28,13 +27,10 @@ from sainet.robots.wire.limits import CYCLE
 from sainet.robots.wire.transport import UdpTransport
 from sainet.runs.errors import BadInput, SainetError
 from sainet.scenes.pushes import Push, PushGrid
-from sainet.scenes.state import at_rest
 from support import REPOSITORY
 
 EXAMPLE = REPOSITORY / "examples" / "cell.toml"
-TABLE = np.array([[-0.05, 0.02, 2.0], [0.055, 0.02, -1.0]])
 PUSH: Push = jax.tree.map(lambda x: x[33], PushGrid().pushes())
-EVERY = 4  # cycles, for each frame
 
 
 def example() -> Cell:
@@ -50,29 +46,6 @@ def example() -> Cell:
     motion = replace(made.motion, hold_s=0.3, largest_age_cycles=25.0)
     controller = replace(made.controller, port=free_port())
     return replace(made, controller=controller, tracker=tracker, motion=motion)
-
-
-def disks_beneath(
-    cell: Cell, names: list[str], start: np.ndarray
-) -> Callable[[np.ndarray], None]:
-    """Disks and a tracker, in the process of the controller."""
-    place, angle = jnp.float32(TABLE[:, :2]), jnp.float32(TABLE[:, 2])
-    table = EmulatedTable(cell.scene, at_rest(place, angle, jnp.zeros(2)))
-    calibration, height = cell.calibration, cell.disks[0].height_mm / 1000
-    to_tracker = calibration.tracker_to_table.inverse
-    port = cell.tracker.port
-    tracker = EmulatedTracker(names, lambda: table.pose, to_tracker, height, port)
-    cycles = iter(range(10**9))
-
-    def carry(tool: np.ndarray) -> None:
-        table.carry(calibration.table_to_robot.inverse.moved(tool))
-        if next(cycles) % EVERY == 0:
-            tracker.tick()
-
-    for height in (0.0, 0.1):  # compiles
-        table.carry(np.array([-0.2, 0.2, height]))
-        assert np.isfinite(table.pose).all()
-    return carry
 
 
 @contextmanager
