@@ -79,7 +79,7 @@ class Bars:
         if self._advance is None:
             bar = progress_bar(event.title, event.total, self._output)
             self._advance, self._done = self._bar.enter_context(bar), 0
-        self._advance(event.done - self._done, event.note)
+        self._advance(event.done - self._done, _note(event))
         self._done = event.done
         if event.has_ended:
             self._bar.close()
@@ -97,3 +97,11 @@ class Bars:
     ) -> None:
         """Stop the bar that an error interrupted."""
         self._bar.close()
+
+
+def _note(event: "Progress") -> str:
+    """Return the note of an event, with the remaining time of all steps."""
+    from sainet.studies.durations import in_words
+
+    left = f"{in_words(event.left)} left in all" if event.left else ""
+    return " · ".join(filter(None, (event.note, left)))

@@ -1,10 +1,10 @@
 """`sainet reproduce`."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
@@ -17,7 +17,9 @@ from sainet.runs.workers import core_count
 from sainet.studies import Scale
 
 if TYPE_CHECKING:
+    from sainet.runs.shards import Shard
     from sainet.studies.runner import Runner
+    from sainet.studies.steps import Step
     from sainet.studies.study import Scope, Study
 
 
@@ -74,9 +76,10 @@ class Reproduce:
                 not_run[name] = message(error, type(self))
                 self.output.warn(f"{name} is not run: {not_run[name]}")
         studies = {name: s for name, s in studies.items() if name not in not_run}
-        steps = last_steps(study.plan(scope) for study in studies.values())
+        steps = list(last_steps(study.plan(scope) for study in studies.values()))
         settings = self._settings(scope, studies)
-        with self._runner(trainers) as runner:
+        expected = self._expected(steps, shard)
+        with self._runner(trainers, expected) as runner:
             if shard is not None:
                 done = run_share(steps, self.out, settings, shard, runner)
                 self.output.say(done.in_words(shard))
@@ -86,12 +89,52 @@ class Reproduce:
                     name: self._answer(name, study, scope, runner)
                     for name, study in studies.items()
                 }
+            self._report(steps, not_run, runner)
         if len(tables) == 1 and not not_run:
             return next(iter(tables.values()))
         return {"studies": tables, "not_run": not_run}
 
+    def _expected(
+        self, lasts: Sequence["Step[Any]"], shard: "Shard | None"
+    ) -> Mapping[str, float]:
+        """Return the seconds that each unfinished step should take, and print a sum."""
+        from sainet.studies.durations import in_words
+        from sainet.studies.effort import expected_seconds
+        from sainet.studies.shares import all_steps, divided, kept_steps, unfinished
+        from sainet.studies.study import STEPS
+
+        if shard is None:
+            steps = list(all_steps(lasts).values())
+        else:
+            steps = divided(kept_steps(lasts), shard)
+        left = unfinished(steps, self.out / STEPS)
+        expected = expected_seconds(left)
+        self.output.say(
+            f"{len(left)} of {len(steps)} steps are left: "
+            f"{in_words(sum(expected.values()))} on {core_count()} cores."
+        )
+        return expected
+
+    def _report(
+        self,
+        lasts: Sequence["Step[Any]"],
+        not_run: Mapping[str, str],
+        runner: "Runner",
+    ) -> None:
+        """Write the report of all studies in the folder."""
+        from sainet.report.pages.page import REPORT, write_report
+        from sainet.studies.shares import all_steps
+        from sainet.studies.whole_report import whole_report
+
+        steps = all_steps(lasts).values()
+        report = whole_report(self.out, self.scale, not_run, steps, runner.clock)
+        path = write_report(report, self.out / REPORT)
+        self.output.say(f"All studies in {self.out} on one page: {path}")
+
     @contextmanager
-    def _runner(self, trainers: int) -> Iterator["Runner"]:
+    def _runner(
+        self, trainers: int, expected: Mapping[str, float]
+    ) -> Iterator["Runner"]:
         """Yield the runner of the steps, which trains several networks at once."""
         from sainet.studies.runner import Runner
         from sainet.studies.study import STEPS
@@ -99,12 +142,12 @@ class Reproduce:
         machines, folder = self.machines, self.out / STEPS
         with machines.executor() as pool, Bars(self.output) as bars:
             if machines.scheduler is not None:
-                yield Runner(folder, pool, bars, pool)
+                yield Runner(folder, pool, bars, pool, expected)
             elif trainers == 1:
-                yield Runner(folder, pool, bars)
+                yield Runner(folder, pool, bars, None, expected)
             else:
                 with machines.executor(trainers, core_each=True) as training:
-                    yield Runner(folder, pool, bars, training)
+                    yield Runner(folder, pool, bars, training, expected)
 
     def _settings(
         self, scope: "Scope", studies: Mapping[str, "Study"]

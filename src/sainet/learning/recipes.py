@@ -15,6 +15,7 @@ from sainet.models.identity import Features
 from sainet.runs.errors import require, unknown_name
 
 Terms = Literal["motion", "error", "metres"]
+Decay = Literal["halving", "cosine"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
 
 
@@ -27,7 +28,7 @@ def _require_at_least(part: object, least: int, *names: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Optimiser:
-    """Adam with a learning rate that is halved at fixed intervals."""
+    """Adam with a learning rate that falls while training goes on."""
 
     iterations: int = 10_000
     """Gradient steps."""
@@ -35,6 +36,9 @@ class Optimiser:
     """Pushes per gradient step."""
     learning_rate: float = 1e-3
     """Initial Adam learning rate."""
+    decay: Decay = "halving"
+    """How the learning rate falls. halving: to a half at fixed intervals (the paper's).
+    cosine: to zero at the last iteration, along half a cosine."""
     halve_every: int = 2_500
     """Iterations between two halvings of the learning rate."""
     clip_norm: float = 1.0
@@ -104,10 +108,20 @@ class WholePush:
     hold: int = 1
     """Zero-order-hold length for additive networks (steps): training computes their
     output once and reuses it. Predictions never hold it."""
+    short_iterations: int = 0
+    """First iterations, in which pushes end early; 0: none."""
+    short_steps: int = 50
+    """Steps of each push in the first iterations, if they are short."""
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
-        _require_at_least(self, 1, "steps", "hold")
+        _require_at_least(self, 1, "steps", "hold", "short_steps")
+        _require_at_least(self, 0, "short_iterations")
+
+    def steps_at(self, iteration: int) -> int:
+        """Return the steps of each push in an iteration, counted from 1."""
+        is_short = iteration <= self.short_iterations
+        return min(self.steps, self.short_steps) if is_short else self.steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +137,10 @@ class SingleSteps:
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
         _require_at_least(self, 1, "steps")
+
+    def steps_at(self, iteration: int) -> int:
+        """Return the steps of each push in any iteration."""
+        return self.steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -173,6 +191,12 @@ class FromSimulator:
 
 
 Horizon = WholePush | SingleSteps
+# Settings that networks were trained without: documents name them where they differ.
+_ADDED = {
+    "decay": Optimiser.decay,
+    "short_iterations": WholePush.short_iterations,
+    "short_steps": WholePush.short_steps,
+}
 Start = Fresh | FromModel | FromSimulator
 
 
@@ -243,6 +267,9 @@ class Recipe:
         flat: dict[str, object] = {"horizon": self.horizon.kind}
         for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
+        for name, usual in _ADDED.items():
+            if flat.get(name) == usual:
+                del flat[name]
         return msgspec.convert(flat | {"horizon": self.horizon.kind}, TrainingSettings)
 
 

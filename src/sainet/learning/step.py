@@ -43,14 +43,20 @@ class FitState(eqx.Module):
 
 
 def make_optimizer(optimiser: Optimiser) -> optax.GradientTransformation:
-    """Return Adam with the paper's schedule, guarded against steps that explode."""
-    schedule = optax.exponential_decay(
-        optimiser.learning_rate, optimiser.halve_every, 0.5, staircase=True
-    )
+    """Return Adam with a falling learning rate, guarded against exploding steps."""
+    schedule = _schedule(optimiser)
     chain = optax.chain(
         optax.clip_by_global_norm(optimiser.clip_norm), optax.adam(schedule)
     )
     return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
+
+
+def _schedule(optimiser: Optimiser) -> optax.Schedule:
+    """Return the learning rate by the number of iterations so far."""
+    first = optimiser.learning_rate
+    if optimiser.decay == "cosine":
+        return optax.cosine_decay_schedule(first, optimiser.iterations)
+    return optax.exponential_decay(first, optimiser.halve_every, 0.5, staircase=True)
 
 
 def trained_layers(network: AbstractNetwork) -> Trained:

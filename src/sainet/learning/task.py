@@ -124,7 +124,9 @@ class Task:
         self, arrays: dict[str, np.ndarray], steps: int, iteration: int
     ) -> PushBatch:
         """Return the batch of stored arrays for an iteration, some of it mirrored."""
-        batch = self.to_batch(arrays, steps)
+        batch = self.to_batch(
+            arrays, min(steps, self.recipe.horizon.steps_at(iteration))
+        )
         if not self.recipe.augmentation.mirror or self.features.has_place:
             return batch
         return mirror_some(batch, self.recipe.seed, iteration)

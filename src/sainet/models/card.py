@@ -30,6 +30,7 @@ class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True):
     batch_size: int
     learning_rate: float
     halve_every: int
+    decay: str | msgspec.UnsetType = msgspec.UNSET  # halving
     clip_norm: float
     average: int
     l2: float | None
@@ -42,6 +43,8 @@ class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True):
     horizon: Literal["whole-push", "single-steps"]
     steps: int
     hold: int | msgspec.UnsetType = msgspec.UNSET  # single steps have none
+    short_iterations: int | msgspec.UnsetType = msgspec.UNSET  # none
+    short_steps: int | msgspec.UnsetType = msgspec.UNSET
     mirror: bool
     validation_share: float
     patience: int

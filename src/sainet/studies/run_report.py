@@ -26,6 +26,7 @@ _FIGURES = {
     "episodes": "Shapes at the start (faint) and at the end, and the goal.",
     "data-efficiency": "Errors over training pushes, as many iterations for all.",
     "recorded-data-efficiency": "Errors over recorded training pushes.",
+    "lab-prediction": "Errors over training pushes in the virtual labs.",
     "engine-errors": "Errors of engines at the end of a push, by place and direction.",
 }
 
@@ -47,7 +48,7 @@ def report_of(folder: Path) -> Report:
     estimates = _estimates(read_identified(folder)) if is_identified else ()
     sentences = (*sentences_of(folder), *estimates)
     episodes = [read_record(path) for path in episode_files(folder)[:_EPISODES]]
-    figures = tuple(_figures(folder))
+    figures = tuple(figures_of(folder))
     if not (table or card or is_identified or episodes or figures):
         raise BadInput(f"{folder}: nothing to show in it{_way_out(folder)}.")
     settings: dict[str, Any] = {**_json(folder / CONFIG), **card}
@@ -91,7 +92,8 @@ def _json(path: Path) -> dict[str, object]:
     return read_json(path) if path.is_file() else {}
 
 
-def _figures(folder: Path) -> Iterator[tuple[Path, str]]:
+def figures_of(folder: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the figures that a command left in a folder, with captions."""
     for name, caption in _FIGURES.items():
         if (folder / f"{name}.svg").is_file():
             yield folder / f"{name}.svg", caption

@@ -1,9 +1,9 @@
 """Runs the steps of studies in order, each once, and reports their progress."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 
 from sainet.learning.log import read_log
 from sainet.runs.workers import each_done, worker_lost
+from sainet.studies.durations import Clock
 from sainet.studies.steps import Apart, Step, Train
 
 _LOOK_AGAIN = 1.0  # s
@@ -26,6 +27,7 @@ class Progress:
     total: int
     note: str = ""
     has_ended: bool = False  # no further event of this step
+    left: float = 0.0  # s, that all unfinished steps are expected to take
 
 
 Report = Callable[[Progress], None]
@@ -38,6 +40,7 @@ class Bar:
     title: str
     total: int
     report: Report
+    clock: Clock
     done: int = 0
     note: str = ""
 
@@ -48,7 +51,8 @@ class Bar:
     def reach(self, done: int, note: str = "") -> None:
         """Report that so much is done in all."""
         self.done, self.note = done, note
-        self.report(Progress(self.title, done, self.total, note))
+        left = self.clock.remaining(done / self.total if self.total else 0.0)
+        self.report(Progress(self.title, done, self.total, note, left=left))
 
 
 @dataclass
@@ -59,7 +63,12 @@ class Runner:
     executor: Executor | None = None  # simulates and runs episodes; None: this process
     report: Report = lambda event: None  # noqa: E731
     trainers: Executor | None = None  # trains networks at once; None: one by one
+    expected: Mapping[str, float] = field(default_factory=dict)  # s, by keys of steps
     _results: dict[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Keep the durations of steps beside their run folders."""
+        self.clock = Clock(self.out, self.expected)
 
     def folder(self, step: Step[Any]) -> Path:
         """Return the run folder of a step."""
@@ -78,7 +87,7 @@ class Runner:
     @contextmanager
     def bar(self, title: str, total: int) -> Iterator[Bar]:
         """Report the beginning and the end of some work, and what is between."""
-        bar = Bar(title, total, self.report)
+        bar = Bar(title, total, self.report, self.clock)
         bar.reach(0)
         yield bar
         self.report(Progress(title, total, total, bar.note, has_ended=True))
@@ -98,7 +107,8 @@ class Runner:
             self._train([s for k in ready if isinstance(s := steps[k], Train)])
             self._work([s for k in ready if isinstance(s := steps[k], Apart)])
             for key in ready:
-                self._results[key] = steps[key].run(self)
+                with self.clock.time([steps[key]], is_all=True):
+                    self._results[key] = steps[key].run(self)
             order.done(*ready)
 
     def _work(self, steps: Sequence[Apart[Any]]) -> None:
@@ -106,7 +116,8 @@ class Runner:
         if self.executor is None or steps == steps[:1]:
             return
         jobs = [(step, self.folder(step), index) for index, step in enumerate(steps)]
-        with self.bar(f"{steps[0].name} and {len(steps) - 1} more", len(steps)) as bar:
+        title = f"{steps[0].name} and {len(steps) - 1} more"
+        with self._timed(steps), self.bar(title, len(steps)) as bar:
             for _ in each_done(self.executor, _work_at, jobs):
                 bar.add(1)
 
@@ -126,7 +137,8 @@ class Runner:
         total = sum(step.iterations for step in left)
         futures: dict[Future[Any], Train] = {}
         try:
-            with self.bar(f"Training {len(left)} networks", total) as bar:
+            title = f"Training {len(left)} networks"
+            with self._timed(left), self.bar(title, total) as bar:
                 for step in left:
                     futures[self.trainers.submit(step.fitting(self))] = step
                 waiting = set(futures)
@@ -140,6 +152,10 @@ class Runner:
         finally:
             for future in futures:
                 future.cancel()
+
+    def _timed(self, steps: Sequence[Step[Any]]) -> AbstractContextManager[None]:
+        """Time work that others do; `run` ends the steps."""
+        return self.clock.time(steps, is_all=False)
 
     def _look(self, futures: dict[Future[Any], Train]) -> tuple[int, str]:
         """Return the iterations so far, and the losses of those under way."""

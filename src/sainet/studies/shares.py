@@ -12,6 +12,7 @@ from typing import Any
 
 from sainet.datasets.schema import ARRAYS
 from sainet.runs.shards import Shard, Share, collect, files_in, open_share
+from sainet.studies.durations import Clock
 from sainet.studies.expected_cost import FitProcess
 from sainet.studies.fine_tuning import Record
 from sainet.studies.runner import Runner
@@ -69,8 +70,8 @@ def last_steps(plans: Iterable[Plan]) -> Iterator[Step[Any]]:
             yield plan.as_trained
 
 
-def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
-    """Return all steps with run folders, by their keys: inputs before what needs them.
+def all_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
+    """Return all steps, by their keys: inputs before what needs them.
 
     The order depends only on the steps, so that all shards count them alike.
     """
@@ -78,7 +79,23 @@ def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
     for step in lasts:
         for each in _needed(step, set()):
             found.setdefault(each.key, each)
-    return {key: step for key, step in found.items() if isinstance(step, KEPT)}
+    return found
+
+
+def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
+    """Return all steps with run folders, as `all_steps` does."""
+    every = all_steps(lasts)
+    return {key: step for key, step in every.items() if isinstance(step, KEPT)}
+
+
+def unfinished(steps: Iterable[Step[Any]], out: Path) -> list[Step[Any]]:
+    """Return the steps without a finished result among the run folders in `out`."""
+    clock, found = Clock(out), []
+    for step in steps:
+        took = clock.duration(step)
+        if took is None or not took.has_ended or not isinstance(step, KEPT):
+            found.append(step)
+    return found
 
 
 def _needed(step: Step[Any], seen: set[str]) -> Iterator[Step[Any]]:

@@ -52,6 +52,17 @@ class PlainTable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Part:
+    """One of several experiments in a report."""
+
+    name: str  # also of its link
+    question: str
+    table: Summary
+    sentences: Sequence[str] = ()
+    figures: Sequence[tuple[Path | str, str]] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Report:
     """Contents of a report. Every string except the SVG of figures is escaped."""
 
@@ -63,6 +74,7 @@ class Report:
     # Files (.svg, .png) or SVG text that the package itself drew, with captions.
     figures: Sequence[tuple[Path | str, str]] = ()
     plain_tables: Sequence[PlainTable] = ()
+    parts: Sequence[Part] = ()
     replays: Sequence[Replay] = ()
     episodes: Sequence[EpisodeRecord] = ()
     manifest: Mapping[str, object] = field(default_factory=dict)
@@ -88,12 +100,27 @@ def to_page(report: Report) -> str:
         table=Markup(to_html(table)) if table else "",
         is_of_trials=report.table is not None and report.table.is_of_trials,
         figures=list(_pictures(report.figures)),
+        parts=list(_parts(report)),
         manifest=list(_flatten(report.manifest)),
         light=css_variables(dark=False),
         dark=css_variables(dark=True),
         css=Markup(read("report.css")),
         script=Markup('"use strict";\n' + "\n".join(map(read, _SCRIPTS))),
     )
+
+
+def _parts(report: Report) -> Iterator[dict[str, object]]:
+    """Yield what the page shows of each part; figures are counted through."""
+    count = 1 + len(report.figures)
+    for part in report.parts:
+        yield {
+            "name": part.name,
+            "question": part.question,
+            "sentences": part.sentences,
+            "figures": list(_pictures(part.figures, count)),
+            "table": Markup(to_html(arrange(part.table))),
+        }
+        count += len(part.figures)
 
 
 def _conclusions(report: Report, table: Table | None) -> Sequence[str]:
@@ -138,8 +165,10 @@ def _plane(position: np.ndarray) -> dict[str, list[float | None]]:
     return plane((1e3 * np.asarray(position, float)).round(_DECIMALS_MM))
 
 
-def _pictures(figures: Sequence[tuple[Path | str, str]]) -> Iterator[dict[str, str]]:
-    for number, (source, caption) in enumerate(figures, start=1):
+def _pictures(
+    figures: Sequence[tuple[Path | str, str]], first: int = 1
+) -> Iterator[dict[str, object]]:
+    for number, (source, caption) in enumerate(figures, start=first):
         if isinstance(source, str):
             picture = inline_svg(source, number)
         elif source.suffix.lower() == ".svg":
@@ -147,7 +176,7 @@ def _pictures(figures: Sequence[tuple[Path | str, str]]) -> Iterator[dict[str, s
         else:
             data = base64.b64encode(source.read_bytes()).decode()
             picture = Markup('<img alt="" src="data:image/png;base64,{}">').format(data)
-        yield {"picture": picture, "caption": caption}
+        yield {"number": number, "picture": picture, "caption": caption}
 
 
 def read_svg(path: Path) -> str:

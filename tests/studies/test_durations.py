@@ -1,0 +1,162 @@
+"""Durations of steps: what is kept, what is expected, and what is left."""
+
+import pytest
+
+from sainet.runs.errors import BadInput
+from sainet.studies import STUDIES, durations, effort, load_study
+from sainet.studies.durations import DURATIONS, Clock, Duration, in_words
+from sainet.studies.effort import Rate, Rates, expected_seconds, measured_rates
+from sainet.studies.runner import Runner
+from sainet.studies.shares import all_steps, last_steps, unfinished
+from sainet.studies.steps import First, Simulate, Step, Train
+from sainet.studies.study import Scope
+
+
+class Wait(Step[str]):
+    """Takes its time."""
+
+    label: str
+    seconds: float = 0.0
+    parts: tuple[Step, ...] = ()
+
+    @property
+    def name(self):
+        return self.label
+
+    def run(self, runner):
+        NOW[0] += self.seconds
+        return self.label
+
+
+NOW = [0.0]
+
+
+@pytest.fixture(autouse=True)
+def clock_of_steps(monkeypatch):
+    """Time passes only in steps."""
+    monkeypatch.setattr(durations, "perf_counter", lambda: NOW[0])
+
+
+def worked(clock, steps, seconds, *, is_all=True):
+    with clock.time(steps, is_all=is_all):
+        NOW[0] += seconds
+
+
+def test_steps_at_once_share_the_time(tmp_path):
+    one, two = Wait("one"), Wait("two")
+    clock = Clock(tmp_path, {one.key: 10.0, two.key: 30.0})
+    worked(clock, [one, two], 8, is_all=False)
+    assert clock.duration(one) == Duration(2, has_ended=False)
+    worked(clock, [two], 1)
+    assert clock.duration(two) == Duration(7, has_ended=True)
+
+
+def test_an_interrupted_step_adds_up_and_a_finished_one_stays(tmp_path):
+    step = Wait("one")
+    with pytest.raises(KeyboardInterrupt), Clock(tmp_path).time([step], is_all=True):
+        NOW[0] += 5
+        raise KeyboardInterrupt
+    assert Clock(tmp_path).duration(step) == Duration(5, has_ended=False)
+    worked(Clock(tmp_path), [step], 3)
+    worked(Clock(tmp_path), [step], 1)  # nothing was left to do
+    assert Clock(tmp_path).duration(step) == Duration(8, has_ended=True)
+
+
+def test_what_takes_no_time_leaves_no_file(tmp_path):
+    worked(Clock(tmp_path), [Wait("one")], 0.01)
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_the_remaining_time_follows_the_pace_of_this_machine(tmp_path):
+    steps = [Wait(str(n)) for n in range(3)]
+    clock = Clock(tmp_path, {step.key: 600.0 for step in steps})
+    assert clock.remaining() == 1800
+    with clock.time(steps[:1], is_all=True):
+        assert clock.remaining(0.5) == 1500
+        NOW[0] += 1200  # twice as slow
+    assert clock.remaining() == pytest.approx(1200 * (1200 + 60) / (600 + 60))
+
+
+def test_a_runner_times_every_step_and_tells_what_is_left(tmp_path):
+    first = Wait("first", 40.0)
+    last = Wait("last", 2.0, (first,))
+    told = []
+    runner = Runner(
+        tmp_path, report=told.append, expected={first.key: 20.0, last.key: 30.0}
+    )
+    with runner.bar("before", 10) as bar:
+        bar.add(5)
+    runner.result(last)
+    took = [runner.clock.duration(step).seconds for step in (first, last)]
+    assert took == pytest.approx([40, 2])
+    assert [event.left for event in told[:2]] == [50, 50]
+    assert runner.clock.remaining() == 0
+
+
+def test_a_damaged_duration_is_named(tmp_path):
+    step = Wait("one")
+    worked(Clock(tmp_path), [step], 3)
+    (path,) = (tmp_path / DURATIONS).iterdir()
+    path.write_text('{"seconds": "long"}')
+    with pytest.raises(BadInput, match=f"{path.name}.*only this duration is lost"):
+        Clock(tmp_path).duration(step)
+
+
+def test_only_finished_steps_with_a_folder_are_not_left(tmp_path):
+    pushes = Simulate("train", effort.steps.GenerateConfig(pushes=10))
+    half, started = First(pushes, 5), Simulate("test", pushes.config)
+    steps = [pushes, half, started]
+    clock = Clock(tmp_path)
+    worked(clock, [pushes, half], 4)
+    worked(clock, [started], 4, is_all=False)
+    assert unfinished(steps, tmp_path) == [half, started]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [
+        *((0, "less than a minute"), (59.9, "less than a minute"), (61, "about 1 min")),
+        *(
+            (3570, "about 60 min"),
+            (3601, "about 1 h 0 min"),
+            (8000, "about 2 h 13 min"),
+        ),
+    ],
+)
+def test_durations_in_words(seconds, words):
+    assert in_words(seconds) == words
+
+
+def steps_of(scale):
+    """The steps of all studies without recorded pushes."""
+    studies = [load_study(name) for name in STUDIES]
+    here = [s for s in studies if Scope.recorded_pushes not in s.needs]
+    return list(all_steps(last_steps(s.plan(Scope(scale)) for s in here)).values())
+
+
+@pytest.mark.parametrize("scale", ["quick", "paper"])
+def test_every_dataset_training_run_and_trial_has_a_measured_rate(scale):
+    rates = measured_rates()
+    slow = (Simulate, Train, effort.simulated_control.RunTrials, effort.Collect)
+    kinds = {effort.effort(s).kind for s in steps_of(scale) if isinstance(s, slow)}
+    assert kinds <= rates.kinds.keys()
+    assert rates.processor and rates.cores
+
+
+def test_expected_seconds_grow_with_the_work_and_shrink_with_cores(monkeypatch):
+    rates = Rates(processor="", cores=4, kinds={"Simulate planar": Rate(1.0, 0.5)})
+    monkeypatch.setattr(effort, "measured_rates", lambda: rates)
+    config = effort.steps.GenerateConfig
+    steps = [Simulate("s", config(pushes=n, disks=d)) for n, d in ((10, 2), (30, 3))]
+    for cores, times in ((4, 1), (8, 0.5)):
+        monkeypatch.setattr(effort, "core_count", lambda cores=cores: cores)
+        found = list(expected_seconds(steps).values())
+        # A push is simulated once for the truth and once for each assumed engine.
+        assert found == [(1 + 0.5 * size) * times for size in (10 * 2 * 2, 30 * 2 * 3)]
+
+
+def test_the_paper_takes_longer_than_the_quick_scale():
+    quick, paper = (
+        sum(expected_seconds(steps_of(s)).values()) for s in ("quick", "paper")
+    )
+    assert paper > 20 * quick > 0
