@@ -271,3 +271,39 @@ def test_a_damaged_line_of_a_log_is_named(tmp_path, line):
     says = rf"^{re.escape(str(tmp_path / LOG))}: line 2 is damaged.*run the same"
     with pytest.raises(BadCheckpoint, match=says):
         read_log(tmp_path)
+
+
+def test_pushes_are_short_in_the_first_iterations(store):
+    recipe = PAPER.changed(batch_size=4, steps=10, short_iterations=3)
+    task = Task("sain", store, recipe, PLANAR)
+    arrays = store.read(slice(0, 4), task.names)
+    for most, taken in (
+        (8, {3: 3, 4: 8}),
+        (2, {3: 2, 4: 2}),
+        (99, {1: 3, 3: 3, 4: 10}),
+    ):
+        for iteration, steps in taken.items():
+            batch = task.to_training_batch(arrays, most, iteration)
+            assert batch.truth.shape[1] == steps
+
+
+def test_short_iterations_resume_to_the_same_weights(store, tmp_path):
+    config = CONFIG.changed(
+        iterations=30, checkpoint_every=5, steps=8, short_iterations=12
+    )
+    whole = fit("sain", store, config, tmp_path / "whole")
+
+    def stop(iteration, loss):
+        if iteration == 9:
+            raise Stopped
+
+    with suppress(Stopped):
+        fit("sain", store, config, tmp_path / "part", on_step=stop)
+    fit("sain", store, config, tmp_path / "part")
+    assert same_weights(whole.folder, tmp_path / "part")
+    other = fit("sain", store, config.changed(short_iterations=0), tmp_path / "long")
+    assert not same_weights(whole.folder, other.folder)
+
+
+def same_weights(one, other):
+    return (one / WEIGHTS).read_bytes() == (other / WEIGHTS).read_bytes()

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import msgspec
 import pytest
 from msgspec.structs import asdict
 
@@ -16,12 +17,14 @@ from sainet.learning.recipes import (
     recipe_for,
     start_named,
 )
+from sainet.models.card import TrainingSettings
 from sainet.runs.errors import BadSetting, UnknownName
 
 AT_LEAST_ONE = ("iterations", "batch_size", "halve_every", "steps", "hold")
 AT_LEAST_ONE += ("log_every", "checkpoint_every")
 NOT_NEGATIVE = ("l2", "weight_position", "weight_rotation", "weight_velocity")
 NOT_NEGATIVE += ("weight_spin", "validation_share", "patience", "average", "seed")
+NOT_NEGATIVE += ("short_iterations",)
 BAD = [(name, bad) for name in AT_LEAST_ONE for bad in (0, -3)]
 BAD += [(n, bad) for n in ("learning_rate", "clip_norm") for bad in (0.0, -1.0)]
 BAD += [(name, -1) for name in NOT_NEGATIVE]
@@ -55,6 +58,15 @@ def test_every_setting_has_one_name_among_all_parts():
     assert asdict(changed.settings()) == asdict(PAPER.settings()) | own
     paper = asdict(PAPER.settings()) | {"horizon": PAPER.horizon}
     assert changed.changed(**paper) == PAPER
+
+
+def test_documents_name_newer_settings_only_where_they_differ():
+    names = {"decay", "short_iterations"}
+    assert not names & msgspec.to_builtins(PAPER.settings()).keys()
+    changed = PAPER.changed(decay="cosine", short_iterations=3).settings()
+    written = msgspec.to_builtins(changed)
+    assert (written["decay"], written["short_iterations"]) == ("cosine", 3)
+    assert msgspec.convert(written, TrainingSettings) == changed
 
 
 def test_settings_of_one_part_are_checked_together():

@@ -185,6 +185,17 @@ def test_the_learning_rate_halves_every_so_many_iterations():
     np.testing.assert_allclose(sizes, wanted, rtol=1e-3)
 
 
+def test_a_cosine_falls_to_zero_at_the_last_iteration():
+    optimiser = Optimiser(learning_rate=0.01, decay="cosine", iterations=8)
+    optimizer, weight = make_optimizer(optimiser), jnp.ones(3)
+    state, sizes = optimizer.init(weight), []
+    for _ in range(9):
+        update, state = optimizer.update(jnp.full(3, 0.2), state, weight)
+        sizes.append(float(-update[0]))
+    wanted = 0.005 * (1 + np.cos(np.pi * np.arange(9) / 8))
+    np.testing.assert_allclose(sizes, wanted, rtol=1e-3, atol=1e-8)
+
+
 def test_large_gradients_are_clipped_and_nan_skipped():
     optimizer = make_optimizer(Optimiser(clip_norm=2.0))
     weight = jnp.zeros(2)

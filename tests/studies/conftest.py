@@ -19,7 +19,7 @@ def tiny(monkeypatch):
     places: dict[str, object] = {"paper_setup.SIZES": sizes}
     places["pretrained.SIZES"] = {"quick": (4, 4, 1)}
     places["data_efficiency.PUSHES"] = {"quick": (3, 6)}
-    places["data_efficiency.AGAIN"] = 6
+    places["data_efficiency.AGAIN"] = {"quick": 6}
     places["variants.L2"] = (1e-4, 1e-6)
     # The tables have every network; here one is enough, and compiles faster.
     for name in ("data_efficiency", "variants", "robustness"):

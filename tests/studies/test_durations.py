@@ -160,3 +160,25 @@ def test_the_paper_takes_longer_than_the_quick_scale():
         sum(expected_seconds(steps_of(s)).values()) for s in ("quick", "paper")
     )
     assert paper > 20 * quick > 0
+
+
+def trained(scope):
+    """How often each network is trained, in the studies of the paper's tables."""
+    plan = load_study("robot-two-disks").plan(scope)
+    networks = [s for s in all_steps([plan.measured]).values() if isinstance(s, Train)]
+    return {n.id.slug: sum(o.id == n.id for o in networks) for n in networks}
+
+
+def test_fewer_training_runs_are_some_of_all():
+    every, one = (all_steps_of(Scope("paper", None, n)) for n in (None, 1))
+    assert one.keys() < every.keys()
+    assert set(trained(Scope("paper")).values()) == {5}
+    assert set(trained(Scope("paper", None, 2)).values()) == {2}
+    assert set(trained(Scope("paper", None, 9)).values()) == {5}
+    assert set(trained(Scope("quick", None, 2)).values()) == {1}
+    assert list(Scope("paper", None, 2).seeds(5, first=3)) == [3, 4]
+
+
+def all_steps_of(scope):
+    plan = load_study("robot-two-disks").plan(scope)
+    return {k: s for k, s in all_steps([plan.measured]).items() if isinstance(s, Train)}

@@ -9,7 +9,7 @@ from sainet.datasets.fixed import FixedConfig
 from sainet.datasets.generate import store_info
 from sainet.runs.errors import BadSetting
 from sainet.studies import load_study
-from sainet.studies.reduced_setup import RUNS, SIZES
+from sainet.studies.reduced_setup import SIZES, TRAININGS
 from sainet.studies.steps import Evaluate, Join, Simulate, Train
 from sainet.studies.study import Scope
 from sainet.worlds.sampling import chunk_generator, draw
@@ -46,7 +46,8 @@ def test_each_network_is_trained_as_its_identity_says(name, scale):
         if internal is not None:
             assert internal.stored_as in store_info(config).assumed_engines
         assert "planar" in config.assumed_engine
-    assert len(networks) == len({n.id for n in networks.values()}) * len(RUNS[scale])
+    runs = TRAININGS if scale == "paper" else 1
+    assert len(networks) == len({n.id for n in networks.values()}) * runs
     tests = {part.pushes.config.seed for part in found}
     assert tests.isdisjoint(n.pushes.config.seed for n in networks.values())
 
@@ -85,7 +86,7 @@ def test_studies_share_their_training_runs():
     crossed = parts("crossed-properties")[1]
     shared = runs[0].keys() & runs[1].keys() & crossed.keys()
     assert {crossed[name].id.slug for name in shared} == {"in", "sain-bullet"}
-    assert len(shared) == 2 * len(RUNS["paper"])
+    assert len(shared) == 2 * TRAININGS
 
 
 def test_fixed_properties_are_those_of_the_papers_disks():

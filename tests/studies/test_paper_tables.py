@@ -10,7 +10,7 @@ from sainet.datasets.store import open_store
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.models.card import read_card
 from sainet.runs.documents import read_json
-from sainet.studies.data_efficiency import AGAIN_CONDITION, IN_FULL
+from sainet.studies.data_efficiency import IN_FULL, of_pushes_again
 from sainet.studies.paper_setup import NETWORKS
 from sainet.studies.paper_tables import PUBLISHED_DIRECT_FORCE_THREE_DISKS
 from sainet.studies.robustness import push_angles
@@ -84,7 +84,7 @@ def test_studies_of_the_robot_setup_share_networks(make, tmp_path):
     efficiency = make("data-efficiency")
     assert rows_of(efficiency) == {
         (group, m, b)
-        for group in ("3", "6", AGAIN_CONDITION.label, IN_FULL.label)
+        for group in ("3", "6", of_pushes_again(6).label, IN_FULL.label)
         for m in models
         for b in (1, 2)
     }

@@ -14,6 +14,7 @@ from sainet.cli.output import Bars, Json, Output
 from sainet.runs.errors import BadInput, MissingExtra
 from sainet.runs.executors import Machines
 from sainet.runs.workers import core_count
+from sainet.scenes.quantities import require_count
 from sainet.studies import Scale
 
 if TYPE_CHECKING:
@@ -47,6 +48,9 @@ class Reproduce:
     recorded: Path | None = None
     """Dataset of recorded pushes, from 'sainet import mitpush-endpoints'.
     Default: none."""
+    trainings: int | None = None
+    """Training runs of each network at the scale paper, at most; with 1 the whole paper
+    takes hours instead of a day. Default: up to five, as each study needs them."""
     trainers: int | None = None
     """Number of networks trained at once, one per core and about 1 GB each; with 1, all
     devices share each batch. Default: one per core, 1 on a GPU."""
@@ -64,7 +68,9 @@ class Reproduce:
         from sainet.studies.shares import collected, last_steps, run_share
         from sainet.studies.study import MissingInput, Scope
 
-        scope = Scope(self.scale, self.recorded)
+        if self.trainings is not None:
+            require_count("trainings", self.trainings)
+        scope = Scope(self.scale, self.recorded, self.trainings)
         studies = {name: load_study(name) for name in self.studies or STUDIES}
         not_run: dict[str, str] = {}
         for name, study in studies.items():
@@ -155,7 +161,7 @@ class Reproduce:
         """Return what all shards of a run have in common."""
         pushes = self.recorded and scope.recorded_pushes().content
         made = {"command": "reproduce", "scale": self.scale, "recorded": pushes}
-        return {**made, "studies": list(studies)}
+        return {**made, "trainings": self.trainings, "studies": list(studies)}
 
     def _answer(
         self, name: str, study: "Study", scope: "Scope", runner: "Runner"

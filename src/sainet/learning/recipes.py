@@ -15,7 +15,6 @@ from sainet.models.identity import Features
 from sainet.runs.errors import require, unknown_name
 
 Terms = Literal["motion", "error", "metres"]
-Decay = Literal["halving", "cosine"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
 
 
@@ -36,17 +35,15 @@ class Optimiser:
     """Pushes per gradient step."""
     learning_rate: float = 1e-3
     """Initial Adam learning rate."""
-    decay: Decay = "halving"
-    """How the learning rate falls. halving: to a half at fixed intervals (the paper's).
-    cosine: to zero at the last iteration, along half a cosine."""
+    decay: Literal["halving", "cosine"] = "halving"
+    """Fall of the learning rate: halving (the paper's) or cosine, to zero."""
     halve_every: int = 2_500
     """Iterations between two halvings of the learning rate."""
     clip_norm: float = 1.0
     """Maximum norm of a gradient; longer ones are shortened to it."""
     average: int = 0
     """Span of the exponential mean of the weights (iterations), with which training
-    ends; 0: the last weights. Long pushes respond to every step of the weights, which
-    fluctuate about the optimum."""
+    ends, since long pushes respond to every step of the weights; 0: the last ones."""
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
@@ -62,9 +59,9 @@ class Objective:
     """The loss: weighted squared errors of the motion (eq. 3) and l2."""
 
     l2: float | None = 1e-6
-    """Weight of the squared weights in the loss; of their squared changes where
-    training starts from a network or the engine. (The paper's 1e-3 is for a loss in
-    metres, this one is scaled.) None: 1 / pushes, so that few pushes change little."""
+    """Weight of the squared weights in the loss (the paper's 1e-3 is for a loss in
+    metres, this one is scaled); of their squared changes where training starts from a
+    network or the engine. None: 1 / pushes, so that few pushes change little."""
     weight_position: float = 1.0
     """Weight of positions in the scaled loss."""
     weight_rotation: float = 1.0
@@ -109,19 +106,12 @@ class WholePush:
     """Zero-order-hold length for additive networks (steps): training computes their
     output once and reuses it. Predictions never hold it."""
     short_iterations: int = 0
-    """First iterations, in which pushes end early; 0: none."""
-    short_steps: int = 50
-    """Steps of each push in the first iterations, if they are short."""
+    """First iterations, in which pushes end after a quarter of the steps."""
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
-        _require_at_least(self, 1, "steps", "hold", "short_steps")
+        _require_at_least(self, 1, "steps", "hold")
         _require_at_least(self, 0, "short_iterations")
-
-    def steps_at(self, iteration: int) -> int:
-        """Return the steps of each push in an iteration, counted from 1."""
-        is_short = iteration <= self.short_iterations
-        return min(self.steps, self.short_steps) if is_short else self.steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +120,7 @@ class SingleSteps:
 
     kind: ClassVar[str] = "single-steps"
     hold: ClassVar[int] = 1
+    short_iterations: ClassVar[int] = 0
 
     steps: int = 200
     """Steps of each push to train on."""
@@ -137,10 +128,6 @@ class SingleSteps:
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
         _require_at_least(self, 1, "steps")
-
-    def steps_at(self, iteration: int) -> int:
-        """Return the steps of each push in any iteration."""
-        return self.steps
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,12 +178,6 @@ class FromSimulator:
 
 
 Horizon = WholePush | SingleSteps
-# Settings that networks were trained without: documents name them where they differ.
-_ADDED = {
-    "decay": Optimiser.decay,
-    "short_iterations": WholePush.short_iterations,
-    "short_steps": WholePush.short_steps,
-}
 Start = Fresh | FromModel | FromSimulator
 
 
@@ -211,13 +192,12 @@ class Recipe:
     stopping: Stopping = Stopping()
     start: Start = Fresh()
     features: Features = "paper"
-    """Features of the network. place: the place on the table and the absolute angle
-    too, with which the friction of a real surface varies. contact: those of each
-    contact in its own frame, for any number of disks (only around an engine). letter:
-    those of the paper's equations in SI units, along the axes of the table.
-    letter-push-frame: the same in the push frame. whole-state: a feedforward network,
-    for as many disks as the training pushes have. nominal: the paper's, of assumed
-    masses and radii."""
+    """Features of the network. place: also the place on the table and the absolute
+    angle, with which the friction of a real surface varies. contact: those of each
+    contact in its own frame (only around an engine). letter: those of the paper's
+    equations in SI units, along the table. letter-push-frame: the same in the push
+    frame. whole-state: a feedforward network, for as many disks as in training.
+    nominal: the paper's, of assumed masses and radii."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""
@@ -267,9 +247,6 @@ class Recipe:
         flat: dict[str, object] = {"horizon": self.horizon.kind}
         for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
-        for name, usual in _ADDED.items():
-            if flat.get(name) == usual:
-                del flat[name]
         return msgspec.convert(flat | {"horizon": self.horizon.kind}, TrainingSettings)
 
 

@@ -124,9 +124,10 @@ class Task:
         self, arrays: dict[str, np.ndarray], steps: int, iteration: int
     ) -> PushBatch:
         """Return the batch of stored arrays for an iteration, some of it mirrored."""
-        batch = self.to_batch(
-            arrays, min(steps, self.recipe.horizon.steps_at(iteration))
-        )
+        horizon = self.recipe.horizon
+        if iteration <= horizon.short_iterations:
+            steps = min(steps, -(-horizon.steps // 4))
+        batch = self.to_batch(arrays, steps)
         if not self.recipe.augmentation.mirror or self.features.has_place:
             return batch
         return mirror_some(batch, self.recipe.seed, iteration)

@@ -20,17 +20,18 @@ IDENTIFIED = "identified.json"
 Count = Annotated[int, msgspec.Meta(ge=1)]
 
 
-class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True):
+class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The settings of a recipe; its start is not one of them.
 
-    Each has the name and the meaning of the field in `learning.recipes`.
+    Each has the name and the meaning of the field in `learning.recipes`. Those with a
+    default are newer than some networks.
     """
 
     iterations: int
     batch_size: int
     learning_rate: float
     halve_every: int
-    decay: str | msgspec.UnsetType = msgspec.UNSET  # halving
+    decay: Literal["halving", "cosine"] = "halving"
     clip_norm: float
     average: int
     l2: float | None
@@ -43,8 +44,7 @@ class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True):
     horizon: Literal["whole-push", "single-steps"]
     steps: int
     hold: int | msgspec.UnsetType = msgspec.UNSET  # single steps have none
-    short_iterations: int | msgspec.UnsetType = msgspec.UNSET  # none
-    short_steps: int | msgspec.UnsetType = msgspec.UNSET
+    short_iterations: int = 0
     mirror: bool
     validation_share: float
     patience: int

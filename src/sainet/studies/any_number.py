@@ -20,7 +20,7 @@ from sainet.learning.recipes import CONTACT, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.studies import Scale
-from sainet.studies.paper_setup import IN, SAIN, physics
+from sainet.studies.paper_setup import IN, SAIN, chunk_of, physics
 from sainet.studies.steps import Evaluate, Join, Load, Simulate, Step, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import Arrangement
@@ -41,7 +41,7 @@ ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
 GAPS_MM = (-2, -1, 0, 1, 2, 5)
 # Training pushes of each number of disks, test pushes of each condition, iterations.
 SIZES = {"quick": (60, 40, 20), "paper": (1500, 500, None)}
-TRAININGS = {"quick": 1, "paper": 5}
+TRAININGS = 5  # of each network
 _TRAINING_SEED, _TEST_SEED = 100, 200
 
 
@@ -62,7 +62,7 @@ def _simulated(label: str, pushes: int, seed: int, config: GenerateConfig) -> Si
         seed=seed,
         engine="bullet",
         assumed_engine=("planar", "planar-true"),
-        chunk_size=min(config.chunk_size, pushes),
+        chunk_size=chunk_of(pushes),
     )
     return Simulate(label, whole)
 
@@ -80,25 +80,25 @@ def test_pushes(scale: Scale, config: GenerateConfig, label: str) -> Simulate:
     return _simulated(f"test-{label}", SIZES[scale][1], seed, config)
 
 
-def of_two(scale: Scale) -> tuple[Train, ...]:
+def of_two(scope: Scope) -> tuple[Train, ...]:
     """Return contact networks that are trained on pushes of two disks."""
-    pushes = training_pushes(scale, 2)
-    return tuple(Train(CONTACTS, pushes, recipe) for recipe in _recipes(scale))
+    pushes = training_pushes(scope.scale, 2)
+    return tuple(Train(CONTACTS, pushes, recipe) for recipe in _recipes(scope))
 
 
-def of_one_to_four(scale: Scale) -> tuple[TrainMixture, ...]:
+def of_one_to_four(scope: Scope) -> tuple[TrainMixture, ...]:
     """Return contact networks that are trained on pushes of one to four disks."""
-    first, *others = (training_pushes(scale, disks) for disks in TRAINED)
+    first, *others = (training_pushes(scope.scale, disks) for disks in TRAINED)
     return tuple(
         TrainMixture(MIXED, first, recipe, more=tuple(others))
-        for recipe in _recipes(scale)
+        for recipe in _recipes(scope)
     )
 
 
-def _recipes(scale: Scale) -> Iterator[Recipe]:
-    iterations = SIZES[scale][2] or CONTACT.optimiser.iterations
-    batch = min(CONTACT.optimiser.batch_size, SIZES[scale][0])
-    for seed in range(TRAININGS[scale]):
+def _recipes(scope: Scope) -> Iterator[Recipe]:
+    iterations = SIZES[scope.scale][2] or CONTACT.optimiser.iterations
+    batch = min(CONTACT.optimiser.batch_size, SIZES[scope.scale][0])
+    for seed in scope.seeds(TRAININGS):
         yield CONTACT.changed(iterations=iterations, seed=seed, batch_size=batch)
 
 
@@ -123,7 +123,7 @@ def _conditions() -> Iterator[tuple[GenerateConfig, Condition]]:
 def _numbers(scope: Scope) -> Plan:
     """Return the errors against the number of disks, in each arrangement."""
     scale = scope.scale
-    models = (*_paper(), *of_two(scale), *of_one_to_four(scale))
+    models = (*_paper(), *of_two(scope), *of_one_to_four(scope))
     parts = (
         Evaluate(models, test_pushes(scale, config, named.label), named)
         for config, named in _conditions()
@@ -138,7 +138,7 @@ def _gaps(scope: Scope) -> Plan:
         label = f"gap of {gap} mm"
         tests = test_pushes(scale, GenerateConfig(gap_mm=gap), label)
         named = Condition(label=label, factors={"gap_mm": gap})
-        parts.append(Evaluate((*_paper(), *of_two(scale)), tests, named))
+        parts.append(Evaluate((*_paper(), *of_two(scope)), tests, named))
     return Plan(Join(tuple(parts)))
 
 

@@ -16,14 +16,9 @@ from sainet.studies.study import RECORDED as RECORDED_PUSHES
 from sainet.studies.study import Plan, Scope, Study
 
 NETWORKS = (IN, SAIN)
-PUSHES = {"quick": (50, 150, 500), "paper": (50, 150, 500, 1500, 4500)}
-SEEDS = {"quick": range(1), "paper": range(3)}
-OTHER_SEEDS = {"quick": range(1, 2), "paper": range(3, 8)}
-AGAIN = 500  # pushes, with other seeds
-AGAIN_CONDITION = Condition(
-    label=f"{AGAIN:,}, other trainings",
-    factors={"training_pushes": AGAIN, "seeds": "other"},
-)
+PUSHES = {"quick": (50, 120), "paper": (50, 150, 500, 1500, 4500)}
+TRAININGS, OTHER_TRAININGS = 3, 5  # of each network
+AGAIN = {"quick": 120, "paper": 500}  # pushes, with other seeds
 IN_FULL = Condition(
     label="all, trained in full", factors={"training_pushes": 4500, "iterations": "all"}
 )
@@ -59,15 +54,23 @@ def _simulated(scope: Scope) -> Plan:
         networks = paper.train(NETWORKS, seeds, recipe, pushes=pushes)
         return paper.compare(networks, paper.test_pushes(), condition)
 
-    seeds, others = SEEDS[scope.scale], OTHER_SEEDS[scope.scale]
+    seeds = scope.seeds(TRAININGS)
+    others = scope.seeds(OTHER_TRAININGS, first=TRAININGS)
     parts = [measure(of_pushes(n), seeds, n) for n in PUSHES[scope.scale]]
-    again = measure(AGAIN_CONDITION, others, AGAIN)
+    number = AGAIN[scope.scale]
+    again = measure(of_pushes_again(number), others, number)
     return Plan(Join((*parts, again, measure(IN_FULL, seeds))))
 
 
 def of_pushes(count: int) -> Condition:
     """Return the condition of a number of training pushes."""
     return Condition(label=f"{count:,}", factors={"training_pushes": count})
+
+
+def of_pushes_again(count: int) -> Condition:
+    """Return the condition of a number of training pushes, with other seeds."""
+    factors: dict[str, float | str] = {"training_pushes": count, "seeds": "other"}
+    return Condition(label=f"{count:,}, other trainings", factors=factors)
 
 
 def _recorded(scope: Scope) -> Plan:

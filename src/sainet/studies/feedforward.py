@@ -24,7 +24,7 @@ OF_THREE = tuple(structs.replace(each, variant="three-disks") for each in OF_TWO
 
 def _plan(scope: Scope) -> Plan:
     """Return the errors of both forms on two disks, and on three."""
-    reduced, three = ReducedSetup(scope.scale), GenerateConfig(disks=3)
+    reduced, three = ReducedSetup(scope), GenerateConfig(disks=3)
     objects = reduced.train(*OBJECTS)
     pushes = reduced.training_pushes("3-disks", three)
     parts = (

@@ -17,14 +17,14 @@ from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER, Recipe
 from sainet.models.identity import Features, ModelId, Variant
-from sainet.studies.paper_setup import IN, SAIN_BULLET, SIZES, Sizes, physics
+from sainet.studies.paper_setup import IN, SAIN_BULLET, SIZES, Sizes, chunk_of, physics
 from sainet.studies.paper_tables import PUBLISHED_DIRECT_FORCE_TWO_DISKS
 from sainet.studies.steps import Evaluate, Join, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.noise import NoiseLevel
 
 NETWORKS = (IN, SAIN_BULLET)
-TRAININGS = {"quick": 1, "paper": 3}
+TRAININGS = 3  # of each network, at reduced size
 _ALL_STEPS = 480  # of a push by a force
 _TRAINING_SEED, _TEST_SEED = 0, 1
 
@@ -107,7 +107,7 @@ class World:
             seed=seed,
             engine="bullet",
             assumed_engine=("bullet", "planar"),  # IN's statistics need planar
-            chunk_size=min(self.config.chunk_size, pushes),
+            chunk_size=chunk_of(pushes),
         )
         return Simulate(f"{self.label}-{label}", whole)
 
@@ -122,7 +122,7 @@ WEAK_DAMPER = GenerateConfig(damping_n_s_m=100.0, force_n=3.5, gap_mm=-2.0)
 def _chain(scope: Scope) -> Plan:
     """Return the errors of each stage, at reduced size and the default noise."""
     world = World("letter", REDUCED[scope.scale])
-    return Plan(world.compare((*CHAIN, LESS_L2), range(TRAININGS[scope.scale])))
+    return Plan(world.compare((*CHAIN, LESS_L2), scope.seeds(TRAININGS)))
 
 
 def _noise(scope: Scope) -> Plan:
@@ -139,7 +139,7 @@ def _noise(scope: Scope) -> Plan:
 def _weak_damper(scope: Scope) -> Plan:
     """Return the errors of both ends where the friction decides, over all 2 s."""
     world = World("weak-damper", REDUCED[scope.scale], WEAK_DAMPER, _ALL_STEPS)
-    return Plan(world.compare((LETTER, USUAL), range(TRAININGS[scope.scale])))
+    return Plan(world.compare((LETTER, USUAL), scope.seeds(TRAININGS)))
 
 
 def _sain_errs_less(stages: Sequence[Stage], condition: str = "") -> tuple[Claim, ...]:

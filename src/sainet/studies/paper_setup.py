@@ -22,7 +22,7 @@ SAIN_BULLET, SAIN, SAIN_TRUE = (
 )
 NETWORKS = (IN, SAIN_BULLET, SAIN, SAIN_TRUE)
 _QUICK_ITERATIONS = 20
-_CHUNK = 250  # pushes
+_MOST_IN_CHUNK = 250  # pushes
 _TEST_SEED, _VALIDATION_SEED = 1, 2
 
 
@@ -35,7 +35,12 @@ class Sizes:
     iterations: int
 
 
-SIZES = {"quick": Sizes(500, 100, 300), "paper": Sizes(4500, 500, 10_000)}
+SIZES = {"quick": Sizes(120, 40, 60), "paper": Sizes(4500, 500, 10_000)}
+
+
+def chunk_of(pushes: int) -> int:
+    """Return the pushes in a chunk of a dataset: whole chunks are simulated at once."""
+    return min(_MOST_IN_CHUNK, -(-pushes // 2))
 
 
 @dataclass(frozen=True)
@@ -137,7 +142,7 @@ class PaperSetup:
             config,
             setup=self.setup,
             engine="bullet",
-            chunk_size=min(_CHUNK, config.pushes),  # whole chunks are simulated
+            chunk_size=chunk_of(config.pushes),
         )
         return steps.Simulate(f"{self.setup}-{label}", whole)
 

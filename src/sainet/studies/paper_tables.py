@@ -11,15 +11,15 @@ from sainet.evaluation.claims import PUBLISHED_ORDER, Claim, errs_less
 from sainet.evaluation.measurements import PublishedValues
 from sainet.learning.recipes import PAPER
 from sainet.models.identity import ModelId
-from sainet.studies.paper_setup import IN, NETWORKS, SAIN, PaperSetup, physics
+from sainet.studies.paper_setup import IN, NETWORKS, SAIN, SIZES, PaperSetup, physics
 from sainet.studies.steps import Evaluate, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import SetupName
 
 BESIDE = NETWORKS  # fine-tuned beside a bystander
-SEEDS = {"quick": range(1), "paper": range(5)}  # training runs of each network
+TRAININGS = 5  # of each network
 # Training pushes, test pushes, iterations, training runs of the table on planar.
-_PLANAR_SIZES = {"quick": (1000, 200, 500, 1), "paper": (4500, 500, 10_000, 3)}
+_PLANAR_TRAININGS = 3
 
 
 def errors_of(
@@ -59,7 +59,7 @@ PUBLISHED_ROBOT_TWO_DISKS = (
 
 def _two_disks(setup: SetupName, scope: Scope) -> Plan:
     paper = PaperSetup(setup, scope.scale)
-    networks = paper.train(NETWORKS, SEEDS[scope.scale])
+    networks = paper.train(NETWORKS, scope.seeds(TRAININGS))
     return Plan(paper.compare(networks, paper.test_pushes()))
 
 
@@ -69,7 +69,7 @@ def _three_disks(scope: Scope) -> Plan:
     In pushes of two disks no disk stays untouched. Networks that were fine-tuned beside
     a bystander were still trained only on pushes of two disks.
     """
-    paper, seeds = PaperSetup("direct-force", scope.scale), SEEDS[scope.scale]
+    paper, seeds = PaperSetup("direct-force", scope.scale), scope.seeds(TRAININGS)
     networks = paper.train(NETWORKS, seeds)
     networks += paper.train_beside_bystander(BESIDE, seeds)
     three = paper.test_pushes("test-3-disks", GenerateConfig(disks=3))
@@ -79,14 +79,14 @@ def _three_disks(scope: Scope) -> Plan:
 
 
 def _planar(scope: Scope) -> Plan:
-    pushes, tests, iterations, runs = _PLANAR_SIZES[scope.scale]
-    train = Simulate("planar-train", GenerateConfig(pushes=pushes))
-    test = Simulate("planar-test", GenerateConfig(pushes=tests, seed=1))
-    recipe = PAPER.changed(iterations=iterations)
+    sizes = SIZES[scope.scale]
+    train = Simulate("planar-train", GenerateConfig(pushes=sizes.pushes))
+    test = Simulate("planar-test", GenerateConfig(pushes=sizes.tests, seed=1))
+    recipe = PAPER.changed(iterations=sizes.iterations)
     networks = tuple(
         Train(network, train, recipe.changed(seed=seed))
         for network in (IN, SAIN)
-        for seed in range(runs)
+        for seed in scope.seeds(_PLANAR_TRAININGS)
     )
     return Plan(Evaluate((*physics(), *networks), test))
 

@@ -20,7 +20,14 @@ from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER, FromModel
 from sainet.models.identity import ModelId
 from sainet.studies.any_number import MIXED, of_one_to_four, test_pushes
-from sainet.studies.paper_setup import IN, SAIN, SAIN_BULLET, PaperSetup, physics
+from sainet.studies.paper_setup import (
+    IN,
+    SAIN,
+    SAIN_BULLET,
+    PaperSetup,
+    chunk_of,
+    physics,
+)
 from sainet.studies.steps import Evaluate, Join, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
 
@@ -47,7 +54,7 @@ def _plan(scope: Scope) -> Plan:
     )
     long_tests = Simulate("long-test", _long_pushes(tests, LONG_PUSHES.seed + 1))
     own, other = Condition(label="robot"), Condition(label="long pushes")
-    (contact, *_) = of_one_to_four(scope.scale)
+    (contact, *_) = of_one_to_four(scope)
     any_number = replace(contact, id=SAIN_ANY)
     three = test_pushes(scope.scale, GenerateConfig(disks=3), "3 disks, cluster")
     measured = Join(
@@ -61,7 +68,7 @@ def _plan(scope: Scope) -> Plan:
 
 
 def _long_pushes(count: int, seed: int) -> GenerateConfig:
-    return replace(LONG_PUSHES, pushes=count, seed=seed, chunk_size=min(250, count))
+    return replace(LONG_PUSHES, pushes=count, seed=seed, chunk_size=chunk_of(count))
 
 
 STUDY = Study(

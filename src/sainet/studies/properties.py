@@ -27,7 +27,7 @@ VARIED, FIXED = "varied properties", "fixed properties"  # of test pushes
 
 def _varied_or_fixed(scope: Scope) -> Plan:
     """Return the errors of networks of either training on either kind of pushes."""
-    reduced = ReducedSetup(scope.scale)
+    reduced = ReducedSetup(scope)
     pushes = reduced.training_pushes("fixed", FixedConfig())
     networks = reduced.train(*NETWORKS) + reduced.train(*OF_FIXED, pushes=pushes)
     tests = {
@@ -45,7 +45,7 @@ def _varied_or_fixed(scope: Scope) -> Plan:
 
 def _crossed(scope: Scope) -> Plan:
     """Return the errors of networks of either inputs without and around engines."""
-    reduced = ReducedSetup(scope.scale)
+    reduced = ReducedSetup(scope)
     networks = reduced.train(*TRUE_INPUTS, *NOMINAL)
     return Plan(reduced.compare(networks, reduced.test_pushes()))
 

@@ -11,29 +11,28 @@ from sainet.datasets.store import Store
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER
 from sainet.models.identity import ModelId
-from sainet.studies import Scale
-from sainet.studies.paper_setup import Sizes, physics
+from sainet.studies.paper_setup import Sizes, chunk_of, physics
 from sainet.studies.steps import Evaluate, Simulate, Step, Train
+from sainet.studies.study import Scope
 
 SIZES = {"quick": Sizes(60, 40, 20), "paper": Sizes(1500, 500, 1500)}
-RUNS = {"quick": range(1), "paper": range(3)}  # training runs of each network
+TRAININGS = 3  # of each network
 # With predictions in the datasets; planar is the default of networks without an engine.
 ENGINES = ("planar", "bullet", "bullet-true")
 _TRAINING_SEED, _TEST_SEED = 300, 400
 _HALVINGS = 4  # of the learning rate, as in the paper's 10,000 iterations
-_CHUNK = 250  # pushes
 
 
 @dataclass(frozen=True)
 class ReducedSetup:
     """The robot setup at reduced size."""
 
-    scale: Scale
+    scope: Scope
 
     @property
     def sizes(self) -> Sizes:
         """How much is simulated and trained."""
-        return SIZES[self.scale]
+        return SIZES[self.scope.scale]
 
     def training_pushes(
         self, label: str = "varied", config: GenerateConfig | None = None
@@ -69,7 +68,7 @@ class ReducedSetup:
                 recipe.changed(features=network.features, seed=seed),
             )
             for network in networks
-            for seed in RUNS[self.scale]
+            for seed in self.scope.seeds(TRAININGS)
         )
 
     def compare(
@@ -91,6 +90,6 @@ def _simulate(
         seed=seed,
         engine="bullet",
         assumed_engine=ENGINES,
-        chunk_size=min(_CHUNK, pushes),
+        chunk_size=chunk_of(pushes),
     )
     return Simulate(f"reduced-{label}", whole)

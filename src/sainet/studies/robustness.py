@@ -12,7 +12,7 @@ from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.scenes.geometry import wrap_angle
 from sainet.studies.paper_setup import NETWORKS, PaperSetup
-from sainet.studies.paper_tables import SEEDS
+from sainet.studies.paper_tables import TRAININGS
 from sainet.studies.steps import Derive, Join, Step
 from sainet.studies.study import Plan, Scope, Study
 
@@ -74,7 +74,7 @@ def push_angles(arrays: Arrays) -> tuple[np.ndarray, np.ndarray]:
 def _plan(scope: Scope) -> Plan:
     """Return the networks of Table III on unseen conditions."""
     paper = PaperSetup("robot", scope.scale)
-    networks = paper.train(NETWORKS, SEEDS[scope.scale])
+    networks = paper.train(NETWORKS, scope.seeds(TRAININGS))
     sets = unseen_sets(paper)
     return Plan(Join(tuple(paper.compare(networks, *each) for each in sets)))
 

@@ -100,6 +100,17 @@ class Scope:
 
     scale: Scale
     recorded: Path | None = None  # dataset that 'sainet import' made
+    trainings: int | None = None  # of each network, at most; None: all
+
+    def seeds(self, trainings: int, first: int = 0) -> range:
+        """Return the seeds of the training runs of a network.
+
+        Args:
+            trainings: at the scale paper; the quick scale has one.
+            first: seed.
+        """
+        wanted = 1 if self.scale == "quick" else trainings
+        return range(first, first + min(wanted, self.trainings or wanted))
 
     def recorded_pushes(self) -> Store:
         """Return the recorded pushes.

@@ -12,7 +12,7 @@ from sainet.studies.steps import Join
 from sainet.studies.study import Choice, Plan, Scope, Study
 
 NETWORKS = (IN, SAIN)
-SEEDS = {"quick": range(1), "paper": range(3)}
+TRAININGS = 3  # of each network
 L2 = (1e-3, 1e-4, 1e-6)
 
 
@@ -22,7 +22,7 @@ def _recurrent_or_not(scope: Scope) -> Plan:
     A network of single steps, and the engine in it, restart at every step: in training
     from the true state, in prediction from the predicted one.
     """
-    paper, seeds = PaperSetup("robot", scope.scale), SEEDS[scope.scale]
+    paper, seeds = PaperSetup("robot", scope.scale), scope.seeds(TRAININGS)
     single = [structs.replace(each, variant="single-steps") for each in NETWORKS]
     recipe = paper.recipe.changed(horizon=SingleSteps())
     networks = paper.train(NETWORKS, seeds) + paper.train(single, seeds, recipe)
