@@ -17,7 +17,7 @@ from sainet.studies.simulated_control import MODELS, PUBLISHED_SIMULATED_CONTROL
 
 
 def test_the_trials_include_those_of_the_paper():
-    found = {each.name: each.config for each in trials(100)}
+    found = {each.name: each.config for each in trials(100, 60)}
     assert all(config.world == "bullet" for config in found.values())
     sizes = [config.trials for config in found.values()]
     assert sizes == [100] * 4 + [50] * 2
@@ -28,7 +28,7 @@ def test_the_trials_include_those_of_the_paper():
 
 @pytest.mark.slow
 def test_all_models_have_the_same_goals(make, tmp_path, monkeypatch):
-    (usual, *_) = trials(2)
+    (usual, *_) = trials(2, 60)
     small = replace(usual.config, world="planar", pushes=1)
     few = replace(usual, config=small, models=MODELS[:2])
     monkeypatch.setattr(simulated_control, "trials", lambda count: [few])

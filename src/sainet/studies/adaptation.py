@@ -14,18 +14,20 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Join, Load
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": 4, "paper": 100}
+TRIALS = {"quick": (2, 5), "paper": (100, 60)}  # and the most pushes of each
 WRONG = 0.1  # fraction of each mass and radius
 NOMINAL, TRUE = physics()
 
 
 def _plan(scope: Scope) -> Plan:
     """Return the trials of each kind of properties, without and with adaptation."""
-    return Plan(Join(tuple(_trials(TRIALS[scope.scale]))))
+    return Plan(Join(tuple(_trials(*TRIALS[scope.scale]))))
 
 
-def _trials(count: int) -> Iterator[RunTrials]:
-    usual = ControlConfig(world="bullet", goals="hard", planner="tree", trials=count)
+def _trials(count: int, pushes: int) -> Iterator[RunTrials]:
+    usual = ControlConfig(
+        world="bullet", goals="hard", planner="tree", trials=count, pushes=pushes
+    )
     nominal = replace(usual, given_properties="assumed")
     for label, config, model in (
         ("true properties", usual, TRUE),

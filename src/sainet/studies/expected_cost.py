@@ -23,7 +23,7 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import First, Join, Simulate, Step
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": 4, "paper": 50}
+TRIALS = {"quick": (2, 5), "paper": (50, 60)}  # and the most pushes of each
 PUSHES = {"quick": (20,), "paper": (50, 300)}
 _PROCESS = ModelId(kind="gp", simulator=SIMULATORS["planar"], features="angle")
 _SEED = 5
@@ -54,12 +54,14 @@ def _plan(scope: Scope) -> Plan:
 
 
 def _trials(scope: Scope) -> Iterator[RunTrials]:
-    counts, count = PUSHES[scope.scale], TRIALS[scope.scale]
+    counts, (count, most) = PUSHES[scope.scale], TRIALS[scope.scale]
     config = GenerateConfig(
         pushes=max(counts), setup="robot", engine="bullet", seed=_SEED
     )
     pushes = Simulate("bullet-few", config)
-    usual = ControlConfig(world="bullet", goals="hard", planner="tree", trials=count)
+    usual = ControlConfig(
+        world="bullet", goals="hard", planner="tree", trials=count, pushes=most
+    )
     for number in counts:
         fitted = FitProcess(First(pushes, number))
         for is_expected in (False, True):

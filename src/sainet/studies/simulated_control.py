@@ -21,7 +21,7 @@ from sainet.studies.runner import Bar, Runner
 from sainet.studies.steps import Join, Load, Step
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": 4, "paper": 100}
+TRIALS = {"quick": (2, 5), "paper": (100, 60)}  # and the most pushes of each
 MODELS = (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
 GOALS = ("easy", "hard")
 PLANNERS = ("greedy", "tree")
@@ -70,12 +70,12 @@ def _plan(scope: Scope) -> Plan:
     At the scale `paper` these are 100 easy and 100 hard goals for each model and
     planner, and 50 goals each with assumed properties and with a row of three disks.
     """
-    return Plan(Join(tuple(trials(TRIALS[scope.scale]))))
+    return Plan(Join(tuple(trials(*TRIALS[scope.scale]))))
 
 
-def trials(count: int) -> Iterator[RunTrials]:
+def trials(count: int, pushes: int) -> Iterator[RunTrials]:
     """Yield the conditions of the paper, then further ones."""
-    usual = ControlConfig(world="bullet", trials=count)
+    usual = ControlConfig(world="bullet", trials=count, pushes=pushes)
     for planner in PLANNERS:
         for goals in GOALS:
             config = replace(usual, planner=planner, goals=goals)
