@@ -35,6 +35,22 @@ def recorded(tmp_path_factory):
     return write(tmp_path_factory.mktemp("few") / "data", info, arrays).path
 
 
+@pytest.fixture(autouse=True)
+def all_pushes(monkeypatch):
+    monkeypatch.setattr("sainet.studies.study.QUICK_RECORDED", PUSHES)
+
+
+def test_the_quick_scale_takes_pushes_from_the_whole_of_a_group(recorded, monkeypatch):
+    monkeypatch.setattr("sainet.studies.study.QUICK_RECORDED", 5)
+    few = Scope("quick", recorded).recorded_pushes()
+    assert few.rows == (
+        0,
+        *(round(n * (PUSHES - 1) / 4) for n in (1, 2, 3)),
+        PUSHES - 1,
+    )
+    assert Scope("paper", recorded).recorded_pushes().info.pushes == PUSHES
+
+
 def test_orders_begin_alike_and_are_tested_on_other_kinds(
     recorded, tmp_path, monkeypatch
 ):

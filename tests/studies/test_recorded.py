@@ -136,7 +136,7 @@ def test_no_push_is_predicted_by_a_network_trained_on_it(tuned, tmp_path):
 def test_settings_of_tuning_are_compared_over_robots(make, monkeypatch, tmp_path):
     one = {"learning_rate": 1e-3, "mirror": False}
     robots = (Robot("a", assumed_friction=0.25), Robot("b", unexplained=0))
-    monkeypatch.setattr(fine_tuning, "ROBOTS", robots)
+    monkeypatch.setattr(fine_tuning, "TRIED", {"quick": robots})
     monkeypatch.setattr(fine_tuning, "WAYS", (Way(FROM_ENGINE, Change(**one)),))
     monkeypatch.setattr(fine_tuning, "WAYS_WITH_FEW", (Way(FROM_ENGINE),))
     monkeypatch.setattr(fine_tuning, "TESTS", {"quick": 4})

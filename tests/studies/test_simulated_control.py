@@ -31,7 +31,7 @@ def test_all_models_have_the_same_goals(make, tmp_path, monkeypatch):
     (usual, *_) = trials(2, 60)
     small = replace(usual.config, world="planar", pushes=1)
     few = replace(usual, config=small, models=MODELS[:2])
-    monkeypatch.setattr(simulated_control, "trials", lambda count: [few])
+    monkeypatch.setattr(simulated_control, "trials", lambda *size: [few])
     table = make("simulated-control")
     assert [row["model"] for row in table["rows"]] == ["physics", "physics-true"]
     assert [row["trials"] for row in table["rows"]] == [2, 2]

@@ -49,6 +49,7 @@ WAYS_WITH_FEW = (
     *(Way(FROM_ENGINE, Change(l2=l2)) for l2 in (1e-3, 1e-2, 0.1)),
 )
 TRAINING, TESTS = {"quick": 20, "paper": 200}, {"quick": 20, "paper": 300}
+TRIED = {"quick": ROBOTS[:1], "paper": ROBOTS}
 FEW = {"quick": 10, "paper": 25}
 _TUNED = ModelId(kind="sain", name="sain-tuned")
 
@@ -72,14 +73,17 @@ class Record(Step[Store]):
 
 
 def _plan(scope: Scope) -> Plan:
-    """Return every way for each robot, then those with few pushes."""
+    """Return every way for each robot, then those with few pushes.
+
+    The quick scale has one robot.
+    """
     scale = scope.scale
     training = Simulate("training", simulated_pushes(TRAINING[scale], 0))
     tests = Simulate("tests", simulated_pushes(TESTS[scale], 1))
     parts = []
     for count, ways in ((TRAINING[scale], WAYS), (FEW[scale], WAYS_WITH_FEW)):
         for way in ways:
-            for robot in ROBOTS:
+            for robot in TRIED[scale]:
                 pushes: Step[Store] = Record(robot, training, is_test=False)
                 if count < TRAINING[scale]:
                     pushes = First(pushes, count)
@@ -90,19 +94,19 @@ def _plan(scope: Scope) -> Plan:
                     Evaluate(
                         (physics()[0], tuned),
                         Record(robot, tests, is_test=True),
-                        _condition(robot, count, way),
+                        _condition(robot.name, count, way),
                         steps=0,
                     )
                 )
     return Plan(Join(tuple(parts)))
 
 
-def _condition(robot: Robot, pushes: int, way: Way) -> Condition:
+def _condition(robot: str, pushes: int, way: Way) -> Condition:
     changes = way.change.items()
     words = "-".join([way.start, *(f"{key}-{value}" for key, value in changes)])
     return Condition(
-        label=f"{robot.name}/{pushes}-pushes/{words}",
-        factors={"robot": robot.name, "training_pushes": pushes, "start": way.start},
+        label=f"{robot}/{pushes}-pushes/{words}",
+        factors={"robot": robot, "training_pushes": pushes, "start": way.start},
     )
 
 
@@ -113,11 +117,12 @@ def choose(summary: Summary) -> tuple[Choice, ...]:
     """
     choices = []
     counts = sorted({int(c.factors["training_pushes"]) for c in summary.conditions})
+    robots = dict.fromkeys(str(c.factors["robot"]) for c in summary.conditions)
     for count, ways in zip(reversed(counts), (WAYS, WAYS_WITH_FEW), strict=True):
         for way in ways:
             scores = {
-                robot.name: _score(summary, _condition(robot, count, way).label)
-                for robot in ROBOTS
+                robot: _score(summary, _condition(robot, count, way).label)
+                for robot in robots
             }
             choice = Choice(
                 pushes=count,

@@ -127,10 +127,10 @@ def _chain(scope: Scope) -> Plan:
 
 def _noise(scope: Scope) -> Plan:
     """Return the errors of both ends of the chain, at full size, at each noise."""
-    parts = []
+    parts, sizes = [], SIZES if scope.scale == "paper" else REDUCED
     for level in get_args(NoiseLevel):
         config = GenerateConfig(noise_level=level)
-        world = World(f"letter-{level}", SIZES[scope.scale], config)
+        world = World(f"letter-{level}", sizes[scope.scale], config)
         named = Condition(label=f"{level} noise", factors={"noise_level": level})
         parts.append(world.compare((LETTER, USUAL), range(1), named))
     return Plan(Join(tuple(parts)))

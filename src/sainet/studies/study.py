@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from sainet.datasets.store import Store, open_store
 from sainet.engines import make_engine
@@ -27,6 +28,7 @@ from sainet.studies.steps import Step, Train
 TABLE = "table.json"
 MEASUREMENTS, AS_TRAINED = "measurements.nc", "as-trained.nc"
 ENGINE_ERRORS = "engine-errors.svg"
+QUICK_RECORDED = 40  # pushes of each group, at the quick scale
 STEPS = "steps"  # folder of the run folders that studies share
 
 
@@ -113,7 +115,7 @@ class Scope:
         return range(first, first + min(wanted, self.trainings or wanted))
 
     def recorded_pushes(self) -> Store:
-        """Return the recorded pushes.
+        """Return the recorded pushes; at the quick scale a few of each group.
 
         Raises:
             MissingInput: none were given.
@@ -124,7 +126,19 @@ class Scope:
                 "`recorded` is missing: give the dataset that 'sainet import "
                 "mitpush-endpoints' made of recorded pushes."
             )
-        return open_store(self.recorded)
+        store = open_store(self.recorded)
+        return store if self.scale == "paper" else _some_of_each_group(store)
+
+
+def _some_of_each_group(store: Store) -> Store:
+    """Return pushes from the whole of each group, in their order."""
+    group = store.read(slice(None), ("group",))["group"]
+    chosen: list[np.ndarray] = []
+    for code in np.unique(group):
+        rows = np.flatnonzero(group == code)
+        few = np.linspace(0, len(rows) - 1, min(len(rows), QUICK_RECORDED))
+        chosen.append(rows[few.round().astype(int)])
+    return store.take(np.sort(np.concatenate(chosen)))
 
 
 Need = Callable[[Scope], object]  # raises what is missing
