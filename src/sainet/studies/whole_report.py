@@ -20,6 +20,10 @@ from sainet.studies.steps import Step
 from sainet.studies.study import TABLE, Result
 
 _NOT_ASKED_FOR = "not asked for"
+_OF_QUICK = (
+    "The quick scale shows that every experiment runs. Its networks have hardly been "
+    "trained: neither its numbers nor its rulings can be compared with the paper's."
+)
 
 
 def folder_of(out: Path, name: str, scale: Scale) -> Path:
@@ -57,6 +61,7 @@ def whole_report(
     return Report(
         title="The whole paper",
         subtitle=f"{len(found)} of {len(STUDIES)} experiments, at the scale {scale}",
+        summary=_OF_QUICK if scale == "quick" else "",
         plain_tables=(
             PlainTable(
                 title="The paper's claims",
