@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
 import sainet as sn
 from learning.stores import info_of, made_up
@@ -18,9 +19,10 @@ from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import MISSED, coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
-from sainet.learning.process import fit_process, quantile
+from sainet.learning.process import _loss_and_slope, fit_process, quantile
 from sainet.learning.process_ends import ends_of
 from sainet.models.correctors import CONFIDENCE, Region
+from sainet.models.correctors.process import kernel_of
 from sainet.models.library import load_model
 from sainet.models.process_card import (
     ARRAYS,
@@ -347,3 +349,27 @@ def test_settings_of_networks_are_refused(store):
         sn.tune("gp", store, start="sain")
     with pytest.raises(BadInput, match="`features` is of `gp`"):
         sn.tune("sain", store, features="side")
+
+
+# CI also runs this without XLA_FLAGS: with the emitters that users have, numbers of
+# pushes from 17 to 27 were once wrong with one input.
+@pytest.mark.parametrize("inputs", [1, 2])
+@pytest.mark.parametrize("pushes", [5, 17, 18, 27, 40])
+def test_the_loss_is_the_density_of_scipy(pushes, inputs):
+    rng = np.random.default_rng(pushes)
+    places, values = rng.normal(size=(pushes, inputs)), rng.normal(size=pushes)
+    at = np.array([0.1, -0.7, *[1.0] * inputs])
+
+    def wanted(at):
+        kernel = kernel_of(jnp.exp(at[0]), jnp.exp(at[2:]))
+        covariance = np.asarray(kernel(jnp.asarray(places), jnp.asarray(places)))
+        covariance = covariance + np.exp(2 * at[1]) * np.eye(pushes)
+        return -multivariate_normal(cov=covariance).logpdf(values)
+
+    with jax.enable_x64(True):
+        found, slope = _loss_and_slope(at, places, values, at)
+        assert found == pytest.approx(wanted(at))
+        for place in range(len(at)):
+            step = 1e-5 * np.eye(len(at))[place]
+            about = (wanted(at + step) - wanted(at - step)) / 2e-5
+            assert slope[place] == pytest.approx(about, rel=1e-4, abs=1e-5)

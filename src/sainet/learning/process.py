@@ -221,7 +221,9 @@ def _most_probable(
     return found.x, float(found.fun)
 
 
-@functools.partial(jax.jit)
+# With one input and 17 to 27 pushes, XLA's newer emitters compile wrong code for CPUs
+# (jaxlib 0.10.2): the value is wrong or infinite, its gradient not a number.
+@functools.partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False})
 @functools.partial(jax.value_and_grad)
 def _loss_and_slope(at: Array, inputs: Array, values: Array, prior: Array) -> Array:
     """Return the negative log density of values and parameters."""
