@@ -8,18 +8,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, singledispatch
 from importlib.resources import files
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
 from sainet.runs.workers import core_count
 from sainet.scenes.quantities import Finite
+from sainet.scenes.scene import TIME_STEP
 from sainet.studies import cross_validation, fine_tuning, simulated_control, steps
 from sainet.studies.lab_pushes import Collect
 from sainet.studies.steps import Step
 
 RATES = "durations.json"
-_DISKS = 2  # of pushes whose number is not known before
 
 
 @dataclass(frozen=True)
@@ -66,20 +66,31 @@ def expected_seconds(steps: Iterable[Step[Any]]) -> Mapping[str, float]:
     return found
 
 
-def _pushes(step: Step[Any]) -> tuple[int, int]:
-    """Return the number of pushes of a dataset, at most, and that of disks."""
+class _Extent(NamedTuple):
+    """Size of a dataset, at most, as far as it is known before."""
+
+    pushes: int = 1
+    disks: int = 2
+    steps: int = 1_000  # of a push
+
+
+def _extent(step: Step[Any]) -> _Extent:
     match step:
         case steps.Simulate(config=config):
-            return config.pushes, config.disks
+            way = config.stroke_mm[-1] / config.speed_mm_s[0] / TIME_STEP
+            is_path = config.setup == "robot"
+            length = round(way) + config.hold_steps if is_path else config.force_steps
+            return _Extent(config.pushes, config.disks, length)
         case steps.Given(store=store):
-            return store.info.pushes, store.info.bodies
+            info = store.info
+            return _Extent(info.pushes, info.bodies, info.steps)
         case steps.First(count=count):
-            return count, _pushes(step.pushes)[1]
+            return _extent(step.pushes)._replace(pushes=count)
         case Collect(config=config):
-            return config.pushes, _DISKS
+            return _Extent(config.pushes)
         case _:
             inner = getattr(step, "pushes", None)
-            return _pushes(inner) if isinstance(inner, Step) else (1, _DISKS)
+            return _extent(inner) if isinstance(inner, Step) else _Extent()
 
 
 @singledispatch
@@ -100,15 +111,16 @@ def _(step: steps.Simulate) -> Effort:
 @effort.register
 def _(step: steps.Train) -> Effort:
     way, optimiser = step.recipe.horizon, step.recipe.optimiser
-    pushes, disks = _pushes(step.pushes)
-    batch = min(optimiser.batch_size, pushes)
-    size = optimiser.iterations * batch * way.steps / way.hold * disks
+    extent = _extent(step.pushes)
+    batch, length = min(optimiser.batch_size, extent.pushes), extent.steps
+    computed = batch * min(way.steps, length) / way.hold * extent.disks
+    size = optimiser.iterations * computed
     return Effort(f"Train {way.kind}" + ", held" * (way.hold > 1), size)
 
 
 @effort.register
 def _(step: steps.Evaluate) -> Effort:
-    return Effort("Evaluate", len(step.models) * _pushes(step.pushes)[0])
+    return Effort("Evaluate", len(step.models) * _extent(step.pushes).pushes)
 
 
 @effort.register
@@ -124,9 +136,9 @@ def _(step: simulated_control.RunTrials) -> Effort:
 @effort.register(fine_tuning.Record)
 @effort.register(Collect)
 def _(step: Step[Any]) -> Effort:
-    return Effort(type(step).__name__, _pushes(step)[0])
+    return Effort(type(step).__name__, _extent(step).pushes)
 
 
 @effort.register
 def _(step: cross_validation.FitCandidate) -> Effort:
-    return Effort(f"Fit {step.candidate.identity.kind}", _pushes(step.engine)[0])
+    return Effort(f"Fit {step.candidate.identity.kind}", _extent(step.engine).pushes)
