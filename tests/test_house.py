@@ -256,11 +256,14 @@ WHOLE_PAPER = (
     "models/nominal",
     "evaluation/rulings",
     "studies/conclusions",
+    "studies/durations",
+    "studies/effort",
     "studies/feedforward",
     "studies/letter",
     "studies/properties",
     "studies/published_physics",
     "studies/reduced_setup",
+    "studies/whole_report",
 )
 MANY_MACHINES = ("evaluation/parts", "runs/executors", "runs/shards", "studies/shares")
 ENGINEER = (
@@ -305,7 +308,8 @@ CONNECTIONS = {
     "ensembles": 62,
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
-    "the whole paper": 200,
+    # Also durations, the report of all studies, and fewer training runs.
+    "the whole paper": 250,
     # Shares of datasets, trials and evaluations, and the options of five commands.
     "many machines": 225,
 }
@@ -375,8 +379,8 @@ COUNTS = {
     ),
     "code lines of many machines": (
         lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),
-        495,
-        495,
+        490,
+        490,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),

@@ -7,9 +7,9 @@ from sainet.studies import STUDIES, durations, effort, load_study
 from sainet.studies.durations import DURATIONS, Clock, Duration, in_words
 from sainet.studies.effort import Rate, Rates, expected_seconds, measured_rates
 from sainet.studies.runner import Runner
-from sainet.studies.shares import all_steps, last_steps, unfinished
+from sainet.studies.shares import unfinished
 from sainet.studies.steps import First, Simulate, Step, Train
-from sainet.studies.study import Scope
+from sainet.studies.study import Scope, all_steps, last_steps
 
 
 class Wait(Step[str]):

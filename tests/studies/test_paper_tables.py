@@ -102,7 +102,7 @@ def test_studies_of_the_robot_setup_share_networks(make, tmp_path):
     assert groups >= {"as trained", "properties ±10 %", "angles outside", "2 mm apart"}
     # In full, on 3 and on 6 pushes, and with another l2.
     made = Counter(map(without_hash, cards(tmp_path)))
-    assert made == {"in-seed-0": 4, "in-seed-1": 1, "in-single-steps-seed-0": 1}
+    assert made == {"in-seed-0": 4, "in-seed-3": 1, "in-single-steps-seed-0": 1}
     check_test_sets(tmp_path / STEPS)
 
 

@@ -16,12 +16,11 @@ from sainet.studies.shares import (
     collected,
     divided,
     kept_steps,
-    last_steps,
     run_share,
 )
 from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Apart, Step
-from sainet.studies.study import Plan
+from sainet.studies.study import Plan, last_steps
 
 SETTINGS = {"command": "test"}
 

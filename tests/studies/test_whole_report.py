@@ -29,7 +29,7 @@ def out(tmp_path):
 
 def report(out, scale="quick", steps=()):
     missing = {"lab-realism": "`recorded` is missing: give it."}
-    return whole_report(out, scale, missing, steps, Clock(out))
+    return whole_report(out, scale, missing, steps, Clock(out), command="sainet")
 
 
 def test_every_study_is_on_the_page_or_not_run_with_a_reason(out):

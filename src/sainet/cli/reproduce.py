@@ -65,8 +65,8 @@ class Reproduce:
         trainers = self._trainer_count()
         shard = self.machines.share
         from sainet.studies import STUDIES, load_study
-        from sainet.studies.shares import collected, last_steps, run_share
-        from sainet.studies.study import MissingInput, Scope
+        from sainet.studies.shares import collected, run_share
+        from sainet.studies.study import MissingInput, Scope, last_steps
 
         if self.trainings is not None:
             require_count("trainings", self.trainings)
@@ -106,8 +106,8 @@ class Reproduce:
         """Return the seconds that each unfinished step should take, and print a sum."""
         from sainet.studies.durations import in_words
         from sainet.studies.effort import expected_seconds
-        from sainet.studies.shares import all_steps, divided, kept_steps, unfinished
-        from sainet.studies.study import STEPS
+        from sainet.studies.shares import divided, kept_steps, unfinished
+        from sainet.studies.study import STEPS, all_steps
 
         if shard is None:
             steps = list(all_steps(lasts).values())
@@ -129,11 +129,14 @@ class Reproduce:
     ) -> None:
         """Write the report of all studies in the folder."""
         from sainet.report.pages.page import REPORT, write_report
-        from sainet.studies.shares import all_steps
+        from sainet.studies.study import all_steps
         from sainet.studies.whole_report import whole_report
 
         steps = all_steps(lasts).values()
-        report = whole_report(self.out, self.scale, not_run, steps, runner.clock)
+        command = f"sainet reproduce --scale {self.scale} --out {self.out}"
+        report = whole_report(
+            self.out, self.scale, not_run, steps, runner.clock, command=command
+        )
         path = write_report(report, self.out / REPORT)
         self.output.say(f"All studies in {self.out} on one page: {path}")
 

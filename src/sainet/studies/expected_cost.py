@@ -59,16 +59,14 @@ def _trials(scope: Scope) -> Iterator[RunTrials]:
         pushes=max(counts), setup="robot", engine="bullet", seed=_SEED
     )
     pushes = Simulate("bullet-few", config)
-    usual = ControlConfig(
-        world="bullet", goals="hard", planner="tree", trials=count, pushes=most
-    )
+    usual = ControlConfig(world="bullet", goals="hard", planner="tree", trials=count)
     for number in counts:
         fitted = FitProcess(First(pushes, number))
         for is_expected in (False, True):
             label = f"{number} pushes" + ", expected cost" * is_expected
             factors: dict[str, float | str] = {"training_pushes": number}
             condition = Condition(label=label, factors=factors)
-            chosen = replace(usual, expected_cost=is_expected)
+            chosen = replace(usual, expected_cost=is_expected, pushes=most)
             yield RunTrials((fitted,), chosen, condition)
 
 

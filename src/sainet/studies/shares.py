@@ -26,7 +26,7 @@ from sainet.studies.steps import (
     Train,
     WithBystander,
 )
-from sainet.studies.study import Plan
+from sainet.studies.study import all_steps
 
 # Steps whose results are kept in run folders. All others are made in memory, quickly.
 KEPT = (
@@ -62,26 +62,6 @@ class Shared:
         )
 
 
-def last_steps(plans: Iterable[Plan]) -> Iterator[Step[Any]]:
-    """Yield the steps that studies ask for; all others are inputs of these."""
-    for plan in plans:
-        yield from (plan.measured, *plan.networks, *plan.engine_errors.values())
-        if plan.as_trained is not None:
-            yield plan.as_trained
-
-
-def all_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
-    """Return all steps, by their keys: inputs before what needs them.
-
-    The order depends only on the steps, so that all shards count them alike.
-    """
-    found: dict[str, Step[Any]] = {}
-    for step in lasts:
-        for each in _needed(step, set()):
-            found.setdefault(each.key, each)
-    return found
-
-
 def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
     """Return all steps with run folders, as `all_steps` does."""
     every = all_steps(lasts)
@@ -96,16 +76,6 @@ def unfinished(steps: Iterable[Step[Any]], out: Path) -> list[Step[Any]]:
         if took is None or not took.has_ended or not isinstance(step, KEPT):
             found.append(step)
     return found
-
-
-def _needed(step: Step[Any], seen: set[str]) -> Iterator[Step[Any]]:
-    """Yield a step after all that it needs, each once."""
-    if step.key in seen:
-        return
-    seen.add(step.key)
-    for each in step.inputs:
-        yield from _needed(each, seen)
-    yield step
 
 
 def _nearest_kept(step: Step[Any]) -> Iterator[Step[Any]]:

@@ -1,8 +1,9 @@
 """Studies: a question, the steps that answer it, and what is made of their results."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -156,6 +157,36 @@ class Plan:
     as_trained: Step[Measurements] | None = None
     engine_errors: Mapping[str, Step[EndOffsets]] = field(default_factory=dict)
     networks: tuple[Train, ...] = ()  # copied into the folder of the study
+
+
+def last_steps(plans: Iterable[Plan]) -> Iterator[Step[Any]]:
+    """Yield the steps that studies ask for; all others are inputs of these."""
+    for plan in plans:
+        yield from (plan.measured, *plan.networks, *plan.engine_errors.values())
+        if plan.as_trained is not None:
+            yield plan.as_trained
+
+
+def all_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
+    """Return all steps, by their keys: inputs before what needs them.
+
+    The order depends only on the steps, so that all shards count them alike.
+    """
+    found: dict[str, Step[Any]] = {}
+    for step in lasts:
+        for each in _needed(step, set()):
+            found.setdefault(each.key, each)
+    return found
+
+
+def _needed(step: Step[Any], seen: set[str]) -> Iterator[Step[Any]]:
+    """Yield a step after all that it needs, each once."""
+    if step.key in seen:
+        return
+    seen.add(step.key)
+    for each in step.inputs:
+        yield from _needed(each, seen)
+    yield step
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,6 +37,8 @@ def whole_report(
     not_run: Mapping[str, str],
     steps: Iterable[Step[Any]],
     clock: Clock,
+    *,
+    command: str,
 ) -> Report:
     """Return the report of all studies that were run in a folder, at one scale.
 
@@ -46,6 +48,7 @@ def whole_report(
         not_run: why a study could not be run, by its name.
         steps: of the studies, whose durations are listed.
         clock: has the durations.
+        command: that runs the studies.
 
     Raises:
         BadInput: a result is damaged.
@@ -82,7 +85,7 @@ def whole_report(
             for name, result in found.items()
         ],
         manifest=msgspec.to_builtins(manifest()),
-        commands=(f"sainet reproduce --scale {scale} --out {out}",),
+        commands=(command,),
     )
 
 
