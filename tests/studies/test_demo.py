@@ -16,6 +16,7 @@ from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
 from sainet.studies import STUDIES, load_study
 from sainet.studies.paper_tables import PUBLISHED_ROBOT_TWO_DISKS
+from sainet.studies.steps import Join
 from sainet.studies.study import Plan, Result, Ruling, Study
 from support import SOURCE
 
@@ -120,16 +121,17 @@ def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys
     assert "sainet[mujoco]" in not_run["lab-control"]
 
 
-def test_claims_are_printed_and_in_the_json(monkeypatch, capsys):
+def test_claims_are_printed_and_in_the_json(monkeypatch, capsys, tmp_path):
     ruled = Result(
         summary=Summary(models=()), claims=(Ruling("the sky is blue", "holds"),)
     )
     claim = Claim("the sky is blue", lambda summary: Verdict("holds"))
-    study = Study(question="Is it?", plan=Plan, needs=(), claims=(claim,))
+    plan = Plan(Join(()))
+    study = Study(question="Is it?", plan=lambda scope: plan, needs=(), claims=(claim,))
     monkeypatch.setattr("sainet.studies.load_study", lambda name: study)
     monkeypatch.setattr(Study, "run", lambda *inputs, command: ruled)
     monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
-    found = Reproduce(studies=("robot-planar",)).run()
+    found = Reproduce(studies=("robot-planar",), out=tmp_path).run()
     assert [*found["claims"]] == [{"claim": "the sky is blue", "status": "holds"}]
     assert "Claim: the sky is blue. Verdict: holds." in capsys.readouterr().out
 

@@ -2,8 +2,8 @@
 
 from importlib.util import find_spec
 
+import msgspec
 import pytest
-from msgspec.structs import asdict
 
 from sainet.learning.recipes import CONTACT, PAPER
 from sainet.models.card import CARD
@@ -38,7 +38,7 @@ def test_small_networks_have_the_cards_of_shipped_networks(make, tmp_path):
         assert made.keys() == shipped.keys()
         assert made["manifest"].keys() == shipped["manifest"].keys()
         assert {n: made[n] for n in SAME} == {n: shipped[n] for n in SAME}
-        assert shipped["recipe"].keys() == asdict(PAPER.settings()).keys()
+        assert shipped["recipe"].keys() == msgspec.to_builtins(PAPER.settings()).keys()
         recipes = [
             {k: v for k, v in card["recipe"].items() if k not in SMALLER}
             for card in (made, shipped)

@@ -221,13 +221,14 @@ def _most_probable(
     return found.x, float(found.fun)
 
 
-# With one input and 17 to 27 pushes, XLA's newer emitters compile wrong code for CPUs
-# (jaxlib 0.10.2): the value is wrong or infinite, its gradient not a number.
-@functools.partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False})
+# A last input is 0 in all pushes and has no effect. With one input alone, XLA compiles
+# wrong code for CPUs (jaxlib 0.10.2): the loss of 17 to 27 pushes is wrong or infinite.
+@functools.partial(jax.jit)
 @functools.partial(jax.value_and_grad)
 def _loss_and_slope(at: Array, inputs: Array, values: Array, prior: Array) -> Array:
     """Return the negative log density of values and parameters."""
-    kernel = kernel_of(jnp.exp(at[0]), jnp.exp(at[2:]))
+    kernel = kernel_of(jnp.exp(at[0]), jnp.append(jnp.exp(at[2:]), 1.0))
+    inputs = jnp.pad(inputs, ((0, 0), (0, 1)))
     process = GaussianProcess(kernel, inputs, diag=jnp.exp(2 * at[1]))
     doubt = jnp.sum(((at - prior) / _PRIOR_WIDTH) ** 2) / 2
     return doubt - process.log_probability(values)
