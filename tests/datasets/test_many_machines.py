@@ -67,8 +67,8 @@ def test_shards_at_once_make_the_bytes_of_one_process(whole_store, tmp_path, cap
     missing = 6 - chunks(out)
     generate(small(), out)
     assert_same_files(out, whole_store)
-    told = f"{out}: {missing} of 6 pieces are missing from 3 shards; they are made now."
-    assert caplog.messages == ([told] if missing else [])
+    line = f"{out}: {missing} of 6 pieces are missing from 3 shards; they are made now."
+    assert caplog.messages == ([line] if missing else [])
     assert generate_share(small(), out, Shard(1, 3)) == 10  # finished: nothing is done
     assert_same_files(out, whole_store)
 

@@ -122,9 +122,9 @@ def test_shards_give_the_same_numbers(printed, command, tmp_path, capsys):
     assert run([*words, "--shard", "1/2", "--folds", "3"]) == 2
     assert "folds is 2, not 3" in capsys.readouterr().err
     assert run(words) == 0
-    told = capsys.readouterr()
-    assert json.loads(told.out) == printed | {"page": str(tmp_path / "report.html")}
-    assert "missing" not in told.err
+    shown = capsys.readouterr()
+    assert json.loads(shown.out) == printed | {"page": str(tmp_path / "report.html")}
+    assert "missing" not in shown.err
     assert not (tmp_path / "shards").exists()
 
 

@@ -1,13 +1,18 @@
 """Durations of steps: what is kept, what is expected, and what is left."""
 
+from collections import Counter
+
 import pytest
 
+from sainet.datasets.config import GenerateConfig
 from sainet.runs.errors import BadInput
 from sainet.studies import STUDIES, durations, effort, load_study
 from sainet.studies.durations import DURATIONS, Clock, Duration, in_words
 from sainet.studies.effort import Rate, Rates, expected_seconds, measured_rates
+from sainet.studies.lab_pushes import Collect
 from sainet.studies.runner import Runner
 from sainet.studies.shares import unfinished
+from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import First, Simulate, Step, Train
 from sainet.studies.study import Scope, all_steps, last_steps
 
@@ -37,15 +42,15 @@ def clock_of_steps(monkeypatch):
     monkeypatch.setattr(durations, "perf_counter", lambda: NOW[0])
 
 
-def worked(clock, steps, seconds, *, is_all=True):
-    with clock.time(steps, is_all=is_all):
+def worked(clock, steps, seconds, *, are_done=True):
+    with clock.time(steps, are_done=are_done):
         NOW[0] += seconds
 
 
 def test_steps_at_once_share_the_time(tmp_path):
     one, two = Wait("one"), Wait("two")
     clock = Clock(tmp_path, {one.key: 10.0, two.key: 30.0})
-    worked(clock, [one, two], 8, is_all=False)
+    worked(clock, [one, two], 8, are_done=False)
     assert clock.duration(one) == Duration(2, has_ended=False)
     worked(clock, [two], 1)
     assert clock.duration(two) == Duration(7, has_ended=True)
@@ -53,7 +58,7 @@ def test_steps_at_once_share_the_time(tmp_path):
 
 def test_an_interrupted_step_adds_up_and_a_finished_one_stays(tmp_path):
     step = Wait("one")
-    with pytest.raises(KeyboardInterrupt), Clock(tmp_path).time([step], is_all=True):
+    with pytest.raises(KeyboardInterrupt), Clock(tmp_path).time([step], are_done=True):
         NOW[0] += 5
         raise KeyboardInterrupt
     assert Clock(tmp_path).duration(step) == Duration(5, has_ended=False)
@@ -71,7 +76,7 @@ def test_the_remaining_time_follows_the_pace_of_this_machine(tmp_path):
     steps = [Wait(str(n)) for n in range(3)]
     clock = Clock(tmp_path, {step.key: 600.0 for step in steps})
     assert clock.remaining() == 1800
-    with clock.time(steps[:1], is_all=True):
+    with clock.time(steps[:1], are_done=True):
         assert clock.remaining(0.5) == 1500
         NOW[0] += 1200  # twice as slow
     assert clock.remaining() == pytest.approx(1200 * (1200 + 60) / (600 + 60))
@@ -80,16 +85,16 @@ def test_the_remaining_time_follows_the_pace_of_this_machine(tmp_path):
 def test_a_runner_times_every_step_and_tells_what_is_left(tmp_path):
     first = Wait("first", 40.0)
     last = Wait("last", 2.0, (first,))
-    told = []
+    events = []
     runner = Runner(
-        tmp_path, report=told.append, expected={first.key: 20.0, last.key: 30.0}
+        tmp_path, report=events.append, expected={first.key: 20.0, last.key: 30.0}
     )
     with runner.bar("before", 10) as bar:
         bar.add(5)
     runner.result(last)
     took = [runner.clock.duration(step).seconds for step in (first, last)]
     assert took == pytest.approx([40, 2])
-    assert [event.left for event in told[:2]] == [50, 50]
+    assert [event.left for event in events[:2]] == [50, 50]
     assert runner.clock.remaining() == 0
 
 
@@ -103,12 +108,12 @@ def test_a_damaged_duration_is_named(tmp_path):
 
 
 def test_only_finished_steps_with_a_folder_are_not_left(tmp_path):
-    pushes = Simulate("train", effort.steps.GenerateConfig(pushes=10))
+    pushes = Simulate("train", GenerateConfig(pushes=10))
     half, started = First(pushes, 5), Simulate("test", pushes.config)
     steps = [pushes, half, started]
     clock = Clock(tmp_path)
     worked(clock, [pushes, half], 4)
-    worked(clock, [started], 4, is_all=False)
+    worked(clock, [started], 4, are_done=False)
     assert unfinished(steps, tmp_path) == [half, started]
 
 
@@ -137,7 +142,7 @@ def steps_of(scale):
 @pytest.mark.parametrize("scale", ["quick", "paper"])
 def test_every_dataset_training_run_and_trial_has_a_measured_rate(scale):
     rates = measured_rates()
-    slow = (Simulate, Train, effort.simulated_control.RunTrials, effort.Collect)
+    slow = (Simulate, Train, RunTrials, Collect)
     kinds = {effort.effort(s).kind for s in steps_of(scale) if isinstance(s, slow)}
     assert kinds <= rates.kinds.keys()
     assert rates.processor and rates.cores
@@ -146,8 +151,9 @@ def test_every_dataset_training_run_and_trial_has_a_measured_rate(scale):
 def test_expected_seconds_grow_with_the_work_and_shrink_with_cores(monkeypatch):
     rates = Rates(processor="", cores=4, kinds={"Simulate planar": Rate(1.0, 0.5)})
     monkeypatch.setattr(effort, "measured_rates", lambda: rates)
-    config = effort.steps.GenerateConfig
-    steps = [Simulate("s", config(pushes=n, disks=d)) for n, d in ((10, 2), (30, 3))]
+    steps = [
+        Simulate("s", GenerateConfig(pushes=n, disks=d)) for n, d in ((10, 2), (30, 3))
+    ]
     for cores, times in ((4, 1), (8, 0.5)):
         monkeypatch.setattr(effort, "core_count", lambda cores=cores: cores)
         found = list(expected_seconds(steps).values())
@@ -162,23 +168,26 @@ def test_the_paper_takes_longer_than_the_quick_scale():
     assert paper > 20 * quick > 0
 
 
-def trained(scope):
-    """How often each network is trained, in the studies of the paper's tables."""
+def networks(scope):
+    """The training runs of Table III, by their keys."""
     plan = load_study("robot-two-disks").plan(scope)
-    networks = [s for s in all_steps([plan.measured]).values() if isinstance(s, Train)]
-    return {n.id.slug: sum(o.id == n.id for o in networks) for n in networks}
+    return {k: s for k, s in all_steps([plan.measured]).items() if isinstance(s, Train)}
+
+
+@pytest.mark.parametrize(
+    ("scope", "runs"),
+    [
+        (Scope("paper"), 5),
+        (Scope("paper", None, 2), 2),
+        (Scope("paper", None, 9), 5),
+        (Scope("quick", None, 2), 1),
+    ],
+)
+def test_each_network_has_at_most_so_many_training_runs(scope, runs):
+    found = Counter(step.id.slug for step in networks(scope).values())
+    assert set(found.values()) == {runs}
 
 
 def test_fewer_training_runs_are_some_of_all():
-    every, one = (all_steps_of(Scope("paper", None, n)) for n in (None, 1))
-    assert one.keys() < every.keys()
-    assert set(trained(Scope("paper")).values()) == {5}
-    assert set(trained(Scope("paper", None, 2)).values()) == {2}
-    assert set(trained(Scope("paper", None, 9)).values()) == {5}
-    assert set(trained(Scope("quick", None, 2)).values()) == {1}
+    assert networks(Scope("paper", None, 1)).keys() < networks(Scope("paper")).keys()
     assert list(Scope("paper", None, 2).seeds(5, first=3)) == [3, 4]
-
-
-def all_steps_of(scope):
-    plan = load_study("robot-two-disks").plan(scope)
-    return {k: s for k, s in all_steps([plan.measured]).items() if isinstance(s, Train)}

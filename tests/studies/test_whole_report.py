@@ -40,7 +40,7 @@ def test_every_study_is_on_the_page_or_not_run_with_a_reason(out):
     assert reasons.keys() | set(RUN) == STUDIES.keys()
     assert reasons["lab-realism"] == "`recorded` is missing: give it."
     assert reasons["gaps"] == "not asked for"
-    assert f"2 of {len(STUDIES)} experiments, at the scale quick" in made.subtitle
+    assert f"2 of {len(STUDIES)} studies, at the scale quick" in made.subtitle
 
 
 def test_results_of_the_other_scale_are_left_out(out):
@@ -61,7 +61,7 @@ def test_durations_are_summed_by_the_kind_of_work(out, monkeypatch):
     steps = [Load(ModelId(kind=name), name) for name in ("in", "sain")]
     monkeypatch.setattr("sainet.studies.durations._SHORTEST", -1.0)
     for step in steps:
-        with clock.time([step], is_all=True):
+        with clock.time([step], are_done=True):
             pass
     *_, durations = report(out, steps=steps).plain_tables
     assert [row[:2] for row in durations.rows] == [("Load", "2")]

@@ -57,7 +57,7 @@ def run_trials(
         BadInput: the model is for other pushes, or an episode is damaged.
     """
     model, _ = prepare(config)  # report errors before any output
-    settings = {"command": "control", "weights": model.digest, **config.settings()}
+    settings = _settings(model, config)
     folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     shards = None if folder.is_finished else collect(out, settings)
     files = [episode_file(out, trial) for trial in range(config.trials)]
@@ -77,6 +77,11 @@ def run_trials(
     return records
 
 
+def _settings(model: Model, config: ControlConfig) -> dict[str, object]:
+    """Return the settings that decide the episodes, as JSON values."""
+    return {"command": "control", "weights": model.digest, **config.settings()}
+
+
 def run_share(
     config: ControlConfig,
     out: Path,
@@ -94,7 +99,7 @@ def run_share(
         BadInput: the model is for other pushes, or an episode is damaged.
     """
     model, _ = prepare(config)
-    settings = {"command": "control", "weights": model.digest, **config.settings()}
+    settings = _settings(model, config)
     devices = jax.device_count()
     folder = open_run(out, settings, finished_by=SUMMARY, devices=devices, shared=True)
     own = shard.own(config.trials)

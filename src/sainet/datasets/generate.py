@@ -1,6 +1,6 @@
 """Simulated datasets, made chunk by chunk by any number of workers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict
 from functools import partial
@@ -12,7 +12,7 @@ from sainet.datasets.batch import check_finite, from_trajectory
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
-from sainet.datasets.writer import write_once, write_share
+from sainet.datasets.writer import MakeChunk, write_once, write_share
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import simulator_named
@@ -54,15 +54,8 @@ def generate(
         MissingExtra: an engine needs a package that is not installed.
         Diverged: an engine produced NaN or infinity.
     """
-    _check_possible(config)
-    return write_once(
-        out,
-        {"command": "generate", **asdict(config)},
-        store_info(config),
-        partial(simulate_chunk, config),
-        executor=executor,
-        on_pushes=on_pushes,
-    )
+    parts = _parts(config)
+    return write_once(out, *parts, executor=executor, on_pushes=on_pushes)
 
 
 def generate_share(
@@ -89,16 +82,15 @@ def generate_share(
         SainetError: whatever `generate` raises.
         RunConflict: the folder has shards of other settings or versions.
     """
+    parts = _parts(config)
+    return write_share(out, *parts, shard=shard, executor=executor, on_pushes=on_pushes)
+
+
+def _parts(config: GenerateConfig) -> tuple[Mapping[str, object], StoreInfo, MakeChunk]:
+    """Return the settings, the form and the chunks of a dataset that is possible."""
     _check_possible(config)
-    return write_share(
-        out,
-        {"command": "generate", **asdict(config)},
-        store_info(config),
-        partial(simulate_chunk, config),
-        shard=shard,
-        executor=executor,
-        on_pushes=on_pushes,
-    )
+    settings = {"command": "generate", **asdict(config)}
+    return settings, store_info(config), partial(simulate_chunk, config)
 
 
 def _check_possible(config: GenerateConfig) -> None:

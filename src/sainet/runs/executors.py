@@ -90,7 +90,7 @@ def _connected(address: str) -> Any:  # noqa: ANN401
         )
     from distributed import Client
 
-    # Otherwise a lost connection is told of in many lines; ours is one.
+    # Dask would report a lost connection in many lines; our error is one.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         client = Client(address, timeout=_ANSWERS_IN, set_as_default=False)

@@ -42,19 +42,19 @@ class Clock:
     _current: tuple[str, ...] = ()
 
     @contextmanager
-    def time(self, steps: Sequence[Step[Any]], *, is_all: bool) -> Iterator[None]:
+    def time(self, steps: Sequence[Step[Any]], *, are_done: bool) -> Iterator[None]:
         """Time some work on steps, also if it fails.
 
         Args:
             steps: what is worked on; each gets its share of the time.
-            is_all: whether the steps end with it.
+            are_done: whether the steps are done after it.
         """
         shares = [self.expected.get(step.key, 0.0) or 1e-9 for step in steps]
         self._current, start = tuple(step.key for step in steps), perf_counter()
         has_ended = False
         try:
             yield
-            has_ended = is_all
+            has_ended = are_done
         finally:
             took, whole = perf_counter() - start, sum(shares)
             for step, share in zip(steps, shares, strict=True):

@@ -107,7 +107,7 @@ class Runner:
             self._train([s for k in ready if isinstance(s := steps[k], Train)])
             self._work([s for k in ready if isinstance(s := steps[k], Apart)])
             for key in ready:
-                with self.clock.time([steps[key]], is_all=True):
+                with self.clock.time([steps[key]], are_done=True):
                     self._results[key] = steps[key].run(self)
             order.done(*ready)
 
@@ -155,7 +155,7 @@ class Runner:
 
     def _timed(self, steps: Sequence[Step[Any]]) -> AbstractContextManager[None]:
         """Time work that others do; `run` ends the steps."""
-        return self.clock.time(steps, is_all=False)
+        return self.clock.time(steps, are_done=False)
 
     def _look(self, futures: dict[Future[Any], Train]) -> tuple[int, str]:
         """Return the iterations so far, and the losses of those under way."""

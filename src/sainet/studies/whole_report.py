@@ -21,7 +21,7 @@ from sainet.studies.study import TABLE, Result
 
 _NOT_ASKED_FOR = "not asked for"
 _OF_QUICK = (
-    "The quick scale shows that every experiment runs. Its networks have hardly been "
+    "The quick scale shows that every study runs. Its networks have hardly been "
     "trained: neither its numbers nor its rulings can be compared with the paper's."
 )
 
@@ -63,7 +63,7 @@ def whole_report(
     concluded = conclude(lambda study: found[study].summary if study in found else None)
     return Report(
         title="The whole paper",
-        subtitle=f"{len(found)} of {len(STUDIES)} experiments, at the scale {scale}",
+        subtitle=f"{len(found)} of {len(STUDIES)} studies, at the scale {scale}",
         summary=_OF_QUICK if scale == "quick" else "",
         plain_tables=(
             PlainTable(
@@ -74,8 +74,8 @@ def whole_report(
             ),
             PlainTable(
                 title="Not run",
-                note="" if missing else "Every experiment was run.",
-                columns=("experiment", "reason"),
+                note="" if missing else "Every study was run.",
+                columns=("study", "reason"),
                 rows=list(missing.items()),
             ),
             _durations(steps, clock),

@@ -53,7 +53,7 @@ class PlainTable:
 
 @dataclass(frozen=True, kw_only=True)
 class Part:
-    """One of several experiments in a report."""
+    """One of several studies in a report."""
 
     name: str  # also of its link
     question: str
