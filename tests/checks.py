@@ -1,8 +1,8 @@
-"""Runtime checks of annotations, in a number that tests can pay for.
+"""Runtime checks of annotations, as many as tests can afford.
 
-A check takes longer than most functions that a simulation calls at every step. Of each
-function the first calls of a test are all checked, and then every so many: the count
-starts anew with each test, so that a test alone and in the suite checks the same calls.
+A check takes longer than most functions that a simulation calls at every step. In each
+test, the first 200 calls of a function are checked, then every fiftieth. Each test
+counts from the start, so that it checks the same calls alone and in the suite.
 """
 
 from functools import partial, wraps
