@@ -60,6 +60,8 @@ for name in HEAVY:
 # the environment forbids bytecode: half of the time of collecting, in every worker.
 sys.dont_write_bytecode = False
 sys.pycache_prefix = str(REPOSITORY / ".pytest_cache" / "bytecode")
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix  # of commands and workers
 # Annotated shapes and types of the package are checked while the tests run.
 checks.install()
 install_import_hook("sainet", "support.typechecker")

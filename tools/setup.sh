@@ -107,6 +107,20 @@ if ! fresh stamp-package "$package"; then
     # hatchling comes from the lock, so nothing unhashed is fetched to build with.
     "$venv/bin/python" -m pip install -qq --disable-pip-version-check \
         --no-deps --no-build-isolation --editable .
+    # Where bytecode is not written, as in many containers, every process would compile
+    # all that it imports: once, at twice the time of the rest of its start.
+    if [ -n "${PYTHONDONTWRITEBYTECODE:-}" ]; then
+        env -u PYTHONDONTWRITEBYTECODE "$venv/bin/python" -c '
+from importlib import import_module
+from pkgutil import walk_packages
+import sainet
+for module in walk_packages(sainet.__path__, "sainet."):
+    try:
+        import_module(module.name)
+    except ImportError:  # of an extra
+        pass
+'
+    fi
     echo "$package" > "$venv/stamp-package"
     echo "$venv is ready ($(size) MB): .venv/bin/sainet --help"
 fi
