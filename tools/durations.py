@@ -19,7 +19,8 @@ from sainet.runs.workers import core_count
 from sainet.studies import STUDIES, load_study
 from sainet.studies.durations import Clock
 from sainet.studies.effort import RATES, Rate, Rates, effort
-from sainet.studies.study import STEPS, Scope, all_steps, last_steps
+from sainet.studies.steps import all_steps
+from sainet.studies.study import STEPS, Scope, last_steps
 
 TARGET = Path(__file__).parents[1] / "src" / "sainet" / "studies" / RATES
 

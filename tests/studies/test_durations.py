@@ -13,8 +13,8 @@ from sainet.studies.lab_pushes import Collect
 from sainet.studies.runner import Runner
 from sainet.studies.shares import unfinished
 from sainet.studies.simulated_control import RunTrials
-from sainet.studies.steps import First, Simulate, Step, Train
-from sainet.studies.study import Scope, all_steps, last_steps
+from sainet.studies.steps import First, Simulate, Step, Train, all_steps
+from sainet.studies.study import Scope, last_steps
 
 
 class Wait(Step[str]):
@@ -42,43 +42,57 @@ def clock_of_steps(monkeypatch):
     monkeypatch.setattr(durations, "perf_counter", lambda: NOW[0])
 
 
-def worked(clock, steps, seconds, *, are_done=True):
-    with clock.time(steps, are_done=are_done):
+def worked(clock, step, seconds):
+    with clock.time(step):
         NOW[0] += seconds
 
 
 def test_steps_at_once_share_the_time(tmp_path):
     one, two = Wait("one"), Wait("two")
-    clock = Clock(tmp_path, {one.key: 10.0, two.key: 30.0})
-    worked(clock, [one, two], 8, are_done=False)
-    assert clock.duration(one) == Duration(2, has_ended=False)
-    worked(clock, [two], 1)
-    assert clock.duration(two) == Duration(7, has_ended=True)
+    clock = Clock(tmp_path)
+    clock.begin(one)
+    NOW[0] += 3
+    clock.begin(two)
+    NOW[0] += 8
+    clock.end(one)
+    NOW[0] += 1
+    clock.end(two)
+    assert clock.duration(one) == Duration(7, has_ended=True)
+    assert clock.duration(two) == Duration(5, has_ended=True)
 
 
 def test_an_interrupted_step_adds_up_and_a_finished_one_stays(tmp_path):
     step = Wait("one")
-    with pytest.raises(KeyboardInterrupt), Clock(tmp_path).time([step], are_done=True):
+    with pytest.raises(KeyboardInterrupt), Clock(tmp_path).time(step):
         NOW[0] += 5
         raise KeyboardInterrupt
     assert Clock(tmp_path).duration(step) == Duration(5, has_ended=False)
-    worked(Clock(tmp_path), [step], 3)
-    worked(Clock(tmp_path), [step], 1)  # nothing was left to do
+    worked(Clock(tmp_path), step, 3)
+    worked(Clock(tmp_path), step, 1)  # nothing was left to do
     assert Clock(tmp_path).duration(step) == Duration(8, has_ended=True)
 
 
 def test_what_takes_no_time_leaves_no_file(tmp_path):
-    worked(Clock(tmp_path), [Wait("one")], 0.01)
+    worked(Clock(tmp_path), Wait("one"), 0.01)
     assert not list(tmp_path.rglob("*.json"))
+
+
+def test_a_clock_without_a_folder_keeps_nothing():
+    clock = Clock()
+    worked(clock, Wait("one"), 3)
+    assert clock.duration(Wait("one")) is None
 
 
 def test_the_remaining_time_follows_the_pace_of_this_machine(tmp_path):
     steps = [Wait(str(n)) for n in range(3)]
     clock = Clock(tmp_path, {step.key: 600.0 for step in steps})
     assert clock.remaining() == 1800
-    with clock.time(steps[:1], are_done=True):
-        assert clock.remaining(0.5) == 1500
-        NOW[0] += 1200  # twice as slow
+    clock.begin(steps[0])
+    NOW[0] += 300
+    assert clock.remaining() == 1500
+    NOW[0] += 900  # twice as slow
+    assert clock.remaining() == 1200  # what takes too long may end at any moment
+    clock.end(steps[0])
     assert clock.remaining() == pytest.approx(1200 * (1200 + 60) / (600 + 60))
 
 
@@ -86,9 +100,8 @@ def test_a_runner_times_every_step_and_tells_what_is_left(tmp_path):
     first = Wait("first", 40.0)
     last = Wait("last", 2.0, (first,))
     events = []
-    runner = Runner(
-        tmp_path, report=events.append, expected={first.key: 20.0, last.key: 30.0}
-    )
+    clock = Clock(tmp_path, {first.key: 20.0, last.key: 30.0})
+    runner = Runner(tmp_path, report=events.append, clock=clock)
     with runner.bar("before", 10) as bar:
         bar.add(5)
     runner.result(last)
@@ -100,7 +113,7 @@ def test_a_runner_times_every_step_and_tells_what_is_left(tmp_path):
 
 def test_a_damaged_duration_is_named(tmp_path):
     step = Wait("one")
-    worked(Clock(tmp_path), [step], 3)
+    worked(Clock(tmp_path), step, 3)
     (path,) = (tmp_path / DURATIONS).iterdir()
     path.write_text('{"seconds": "long"}')
     with pytest.raises(BadInput, match=f"{path.name}.*only this duration is lost"):
@@ -112,8 +125,11 @@ def test_only_finished_steps_with_a_folder_are_not_left(tmp_path):
     half, started = First(pushes, 5), Simulate("test", pushes.config)
     steps = [pushes, half, started]
     clock = Clock(tmp_path)
-    worked(clock, [pushes, half], 4)
-    worked(clock, [started], 4, are_done=False)
+    worked(clock, pushes, 4)
+    worked(clock, half, 4)
+    with pytest.raises(KeyboardInterrupt), clock.time(started):
+        NOW[0] += 4
+        raise KeyboardInterrupt
     assert unfinished(steps, tmp_path) == [half, started]
 
 

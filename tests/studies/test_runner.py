@@ -1,8 +1,9 @@
-"""The runner: order, resumption, and networks trained at once."""
+"""The runner: order, resumption, and steps at once."""
 
 import threading
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from sainet.runs.errors import RunConflict, SainetError
 from sainet.runs.workers import worker_pool
 from sainet.studies.paper_setup import IN, SAIN
 from sainet.studies.runner import Runner
-from sainet.studies.steps import Apart, Given, Step, Train
+from sainet.studies.steps import Apart, Given, Place, Step, Train
 
 CONFIG = PAPER.changed(iterations=20, batch_size=8, log_every=5)
 SEEDS = (3, 4)
@@ -61,34 +62,150 @@ class Sum(Step[int]):
 class Note(Apart[str]):
     """Writes a file in its folder, and names the thread that did so."""
 
-    label: str
+    is_kept = True
 
-    def work(self, folder):
+    label: str
+    parts: tuple[Step, ...] = ()
+
+    @property
+    def name(self):
+        return self.label
+
+    def run(self, runner):
+        folder = runner.folder(self)
         if not (folder / "note").exists():
             folder.mkdir(parents=True)
             (folder / "note").write_text(threading.current_thread().name)
+        return (folder / "note").read_text()
+
+
+class Who(Apart[str]):
+    """Names the thread that ran it, and keeps nothing."""
+
+    label: str
+
+    @property
+    def name(self):
+        return self.label
 
     def run(self, runner):
-        self.work(runner.folder(self))
-        return (runner.folder(self) / "note").read_text()
+        return threading.current_thread().name
 
 
-class Notes(Step[list[str]]):
-    """Who wrote each note."""
+class Spread(Step[list[str]]):
+    """Uses the executor of the runner; names the thread that asked it to."""
 
-    parts: tuple[Note, ...]
+    parts: tuple[Step, ...]
+
+    @property
+    def place(self):
+        return Place.SPREAD
+
+    def run(self, runner):
+        return [threading.current_thread().name, *map(runner.result, self.parts)]
+
+
+class Names(Step[list[str]]):
+    """Who ran each part."""
+
+    parts: tuple[Step, ...]
 
     def run(self, runner):
         return [runner.result(part) for part in self.parts]
 
 
-def test_work_apart_is_done_by_the_executor_where_there_are_several(tmp_path):
-    several, one = Notes((Note("a"), Note("b"))), Notes((Note("c"),))
-    with ThreadPoolExecutor(2, "worker") as executor:
-        runner = Runner(tmp_path, executor)
-        assert all("worker" in name for name in runner.result(several))
-        assert runner.result(one) == ["MainThread"]
-    assert Runner(tmp_path).result(Notes((Note("d"), Note("e")))) == ["MainThread"] * 2
+class Fails(Apart[None]):
+    """Does not work."""
+
+    def run(self, runner):
+        raise SainetError("it does not work")
+
+
+@pytest.fixture
+def executor():
+    with ThreadPoolExecutor(2, "worker") as found:
+        yield found
+
+
+def test_steps_apart_run_in_other_processes(tmp_path, executor):
+    names = Names((Note("a"), Who("b"), Note("c", (Note("d"),))))
+    found = Runner(tmp_path, executor, at_once=2).result(names)
+    assert all("worker" in name for name in found)
+    for one in (Runner(tmp_path / "one", executor), Runner(tmp_path / "two")):
+        assert one.result(names) == ["MainThread"] * 3
+
+
+def test_a_step_in_pieces_runs_here_after_its_inputs(tmp_path, executor):
+    spread = Spread((Note("a"), Who("b")))
+    found = Runner(tmp_path, executor, at_once=2).result(Names((spread, Note("c"))))
+    assert found[0][0] == "MainThread"
+    assert all("worker" in name for name in (*found[0][1:], found[1]))
+
+
+class Listed(ThreadPoolExecutor):
+    """Runs jobs one after another, and lists their steps."""
+
+    def __init__(self):
+        super().__init__(1, "worker")
+        self.order = []
+
+    def submit(self, fn, step, out):
+        self.order.append(step.name)
+        future = super().submit(fn, step, out)
+        future.exception()
+        return future
+
+
+def test_steps_ahead_run_beside_those_that_are_needed(tmp_path):
+    needed, ahead = Names((Note("a"),)), Names((Who("x"), Note("y"), Who("z")))
+    with Listed() as executor:
+        runner = Runner(tmp_path, executor, at_once=2, ahead=[needed, ahead])
+        runner.result(needed)
+        assert executor.order[:2] == ["a", "x"]
+        runner.result(ahead)
+        assert sorted(executor.order) == ["a", "x", "y", "z"]
+
+
+class Held(Executor):
+    """Has jobs, of which none ends until all are released."""
+
+    def __init__(self):
+        self.jobs = []
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        self.jobs.append((future, partial(fn, *args)))
+        assert len(self.jobs) <= 2
+        if len(self.jobs) == 2:
+            self.release()
+        return future
+
+    def release(self):
+        for future, job in self.jobs:
+            future.set_result(job())
+        self.jobs = []
+
+
+def test_the_executor_has_at_most_so_many_steps_at_once(tmp_path):
+    names = Names(tuple(Who(f"{n}") for n in range(4)))
+    found = Runner(tmp_path, Held(), at_once=2).result(names)
+    assert found == ["MainThread"] * 4
+
+
+def test_progress_counts_steps_and_names_those_that_run(tmp_path):
+    events = []
+    names = Names(tuple(Who(f"{n}") for n in range(4)))
+    Runner(tmp_path, Held(), events.append, at_once=2).result(names)
+    assert {(event.title, event.total) for event in events} == {("0 and 3 more", 4)}
+    assert [event.done for event in events][::2] == [0, 4]
+    assert events[1].note == "2, 3"
+    assert events[-1].has_ended
+
+
+def test_a_failed_step_is_reported_and_the_others_are_given_up(tmp_path):
+    last = Names((Fails(), Note("a")))
+    with Listed() as executor, pytest.raises(SainetError, match="does not work"):
+        Runner(tmp_path, executor, at_once=2).result(last)
 
 
 def test_every_step_runs_once_after_its_inputs(tmp_path):
@@ -146,26 +263,19 @@ def networks(store, seeds=SEEDS):
     )
 
 
-def runner_of(folder, trainers=None):
-    """A runner, and its events by title: the total and what was done at last."""
+@pytest.mark.slow
+def test_networks_trained_at_once_are_the_same(store, tmp_path):
     told = {}
 
     def report(event):
         told[event.title] = (event.total, event.done, event.has_ended)
 
-    return Runner(folder, Broken(), report, trainers), told
-
-
-@pytest.mark.slow
-def test_parallel_training_gives_the_same_networks(store, tmp_path):
-    alone, told_alone = runner_of(tmp_path / "alone")
-    step = networks(store)
+    alone, step = Runner(tmp_path / "alone", report=report), networks(store)
     assert [model.id for model in alone.result(step)] == [IN, IN, SAIN, SAIN]
-    assert told_alone["Training sain-seed-4"] == (20, 20, True)
-    with worker_pool(2, core_each=True) as trainers:
-        at_once, told = runner_of(tmp_path / "at-once", trainers)
+    assert told["Training sain-seed-4"] == (20, 20, True)
+    with worker_pool(2, core_each=True) as executor:
+        at_once = Runner(tmp_path / "at-once", executor, at_once=3)
         at_once.result(step)
-    assert told["Training 4 networks"] == (80, 80, True)
     for each in step.networks:
         card = read_card(at_once.folder(each))
         known = card.identity.kind, card.recipe.seed
@@ -174,12 +284,6 @@ def test_parallel_training_gives_the_same_networks(store, tmp_path):
         assert [line.iteration for line in two] == [5, 10, 15, 20]
         losses = [[line.loss for line in lines] for lines in (one, two)]
         np.testing.assert_allclose(*losses, rtol=1e-3)
-    # Finished and single training runs need no process.
-    again, told = runner_of(at_once.out, Broken())
-    again.result(step)
-    assert list(told.values()) == [(20, 20, True)] * 4
-    again.result(All((*step.networks, Train(IN, Given(store), CONFIG))))
-    assert told["Training in-seed-0"] == (20, 20, True)
 
 
 def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
@@ -194,8 +298,8 @@ def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
 
 def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):
     step = networks(store)
-    with worker_pool(1) as trainers:
-        runner = Runner(tmp_path, trainers=trainers)
+    with worker_pool(1) as executor:
+        runner = Runner(tmp_path, executor, at_once=1)
         folder = runner.folder(step.networks[0])
         folder.mkdir()
         (folder / "config.json").write_text("{}")
@@ -206,4 +310,4 @@ def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):
 @pytest.mark.parametrize("processes", [Broken(), Gone()])
 def test_a_killed_training_process_is_reported(store, tmp_path, processes):
     with pytest.raises(SainetError, match="memory ran out"):
-        Runner(tmp_path, trainers=processes).result(networks(store))
+        Runner(tmp_path, processes, at_once=2).result(networks(store))

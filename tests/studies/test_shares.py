@@ -9,39 +9,24 @@ import pytest
 from sainet import studies
 from sainet.runs.errors import BadInput
 from sainet.runs.shards import SHARDS, Shard
-from sainet.studies import shares
 from sainet.studies.runner import Runner
 from sainet.studies.shares import (
-    KEPT,
     collected,
     divided,
     kept_steps,
     run_share,
 )
 from sainet.studies.simulated_control import RunTrials
-from sainet.studies.steps import Apart, Step
+from sainet.studies.steps import Step
 from sainet.studies.study import Plan, last_steps
 
 SETTINGS = {"command": "test"}
 
 
-class Note(Apart[str]):
-    """Writes its name in its folder; the work of a fold."""
-
-    label: str
-    parts: tuple[Step, ...] = ()
-
-    def work(self, folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "note").write_text(self.label)
-
-    def run(self, runner):
-        self.work(runner.folder(self))
-        return self.label
-
-
 class Data(Step[str]):
     """Kept like a dataset: what it needs may belong to another shard."""
+
+    is_kept = True
 
     label: str
     parts: tuple[Step, ...] = ()
@@ -53,6 +38,14 @@ class Data(Step[str]):
         return self.label
 
 
+class Note(Data):
+    """The work of a fold."""
+
+    @property
+    def stays_with_inputs(self):
+        return bool(self.parts)
+
+
 class Memory(Step[str]):
     """Not kept."""
 
@@ -60,11 +53,6 @@ class Memory(Step[str]):
 
     def run(self, runner):
         return "".join(runner.result(part) for part in self.parts)
-
-
-@pytest.fixture
-def kept(monkeypatch):
-    monkeypatch.setattr(shares, "KEPT", (*KEPT, Data))
 
 
 def every_step():
@@ -84,7 +72,7 @@ def test_every_step_with_a_run_folder_is_divided():
     assert RunTrials in kinds
     # `run` of a step with a folder of its own asks for this folder.
     writers = [k for k in kinds if "runner.folder(self)" in inspect.getsource(k)]
-    assert [kind for kind in writers if not issubclass(kind, KEPT)] == []
+    assert [kind for kind in writers if not kind.is_kept] == []
 
 
 def folds(count):
@@ -116,7 +104,6 @@ def share(out, last, number, count=2):
     return run_share([last], out, SETTINGS, Shard(number, count), runner)
 
 
-@pytest.mark.usefixtures("kept")
 def test_a_shard_does_what_it_can_and_goes_on_later(tmp_path):
     first = Data("first")
     last = Memory((Data("second", (Memory((first,)),)), Data("third", (first,))))

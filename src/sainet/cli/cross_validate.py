@@ -59,7 +59,7 @@ class CrossValidate:
         from sainet.datasets.store import open_part
         from sainet.report.writers import print_table, write_table
         from sainet.studies.cross_validation import candidates_named, cross_validated
-        from sainet.studies.runner import Runner
+        from sainet.studies.runner import MANY, Runner
         from sainet.studies.shares import collected, run_share
         from sainet.studies.study import STEPS
         from sainet.studies.validation import cross_validate
@@ -72,7 +72,7 @@ class CrossValidate:
         shard = self.machines.share
         executor = self.machines.executor(core_each=True)
         with executor as pool, Bars(self.output) as bars:
-            runner = Runner(self.out / STEPS, pool, bars)
+            runner = Runner(self.out / STEPS, pool, bars, MANY)
             if shard is not None:
                 done = run_share(parts, self.out, settings, shard, runner)
                 self.output.say(done.in_words(shard))

@@ -51,9 +51,9 @@ class Reproduce:
     trainings: int | None = None
     """Training runs of each network at the scale paper, at most; with 1 the whole paper
     takes hours instead of a day. Default: up to five, as each study needs them."""
-    trainers: int | None = None
-    """Number of networks trained at once, one per core and about 1 GB each; with 1, all
-    devices share each batch. Default: one per core, 1 on a GPU."""
+    at_once: int | None = None
+    """Number of steps run at once, each in a process on one core and with about 1 GB;
+    with 1, one after another on all devices. Default: one per core, 1 on a GPU."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     machines: Machines = field(default_factory=Machines)
@@ -62,7 +62,7 @@ class Reproduce:
     def run(self) -> Json:
         """Run the studies one after another, or the steps of a shard."""
         use_devices(self.devices)
-        trainers = self._trainer_count()
+        at_once = self._steps_at_once()
         shard = self.machines.share
         from sainet.studies import STUDIES, load_study
         from sainet.studies.shares import collected, run_share
@@ -85,7 +85,7 @@ class Reproduce:
         steps = list(last_steps(study.plan(scope) for study in studies.values()))
         settings = self._settings(scope, studies)
         expected = self._expected(steps, shard)
-        with self._runner(trainers, expected) as runner:
+        with self._runner(at_once, steps, expected) as runner:
             if shard is not None:
                 done = run_share(steps, self.out, settings, shard, runner)
                 self.output.say(done.in_words(shard))
@@ -107,7 +107,8 @@ class Reproduce:
         from sainet.studies.durations import in_words
         from sainet.studies.effort import expected_seconds
         from sainet.studies.shares import divided, kept_steps, unfinished
-        from sainet.studies.study import STEPS, all_steps
+        from sainet.studies.steps import all_steps
+        from sainet.studies.study import STEPS
 
         if shard is None:
             steps = list(all_steps(lasts).values())
@@ -129,7 +130,7 @@ class Reproduce:
     ) -> None:
         """Write the report of all studies in the folder."""
         from sainet.report.pages.page import REPORT, write_report
-        from sainet.studies.study import all_steps
+        from sainet.studies.steps import all_steps
         from sainet.studies.whole_report import whole_report
 
         steps = all_steps(lasts).values()
@@ -142,21 +143,26 @@ class Reproduce:
 
     @contextmanager
     def _runner(
-        self, trainers: int, expected: Mapping[str, float]
+        self, at_once: int, steps: Sequence["Step[Any]"], expected: Mapping[str, float]
     ) -> Iterator["Runner"]:
-        """Yield the runner of the steps, which trains several networks at once."""
-        from sainet.studies.runner import Runner
+        """Yield the runner of the steps, which runs several at once."""
+        from sainet.studies.durations import Clock
+        from sainet.studies.runner import MANY, Runner
         from sainet.studies.study import STEPS
 
-        machines, folder = self.machines, self.out / STEPS
-        with machines.executor() as pool, Bars(self.output) as bars:
+        folder, machines = self.out / STEPS, self.machines
+        clock = Clock(folder, expected)
+        workers = None if at_once == 1 else at_once
+        with (
+            machines.executor(workers, core_each=at_once > 1) as pool,
+            Bars(self.output) as bars,
+        ):
             if machines.scheduler is not None:
-                yield Runner(folder, pool, bars, pool, expected)
-            elif trainers == 1:
-                yield Runner(folder, pool, bars, None, expected)
-            else:
-                with machines.executor(trainers, core_each=True) as training:
-                    yield Runner(folder, pool, bars, training, expected)
+                yield Runner(folder, pool, bars, MANY, steps, clock)
+            elif at_once == 1:
+                yield Runner(folder, pool, bars, clock=clock)
+            else:  # while this process makes a table, the next step begins
+                yield Runner(folder, pool, bars, at_once + 1, steps, clock)
 
     def _settings(
         self, scope: "Scope", studies: Mapping[str, "Study"]
@@ -184,8 +190,8 @@ class Reproduce:
             console.print(ruling, markup=False, soft_wrap=True)
         return result.to_json()
 
-    def _trainer_count(self) -> int:
-        """Return the number of networks to train at once.
+    def _steps_at_once(self) -> int:
+        """Return the number of steps to run at once.
 
         Raises:
             BadInput: fewer than one is wanted, or several on one GPU.
@@ -193,11 +199,11 @@ class Reproduce:
         import jax
 
         is_cpu = jax.default_backend() == "cpu"
-        count = self.trainers
+        count = self.at_once
         if count is None:
             count = core_count() if is_cpu else 1
         if count < 1:
-            raise BadInput(f"--trainers is {count}; it must be at least 1.")
+            raise BadInput(f"--at-once is {count}; it must be at least 1.")
         if count > 1 and not is_cpu:
-            raise BadInput(f"--trainers is {count}; on a GPU it must be 1.")
+            raise BadInput(f"--at-once is {count}; on a GPU it must be 1.")
         return count

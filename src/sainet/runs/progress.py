@@ -9,6 +9,7 @@ from sainet.runs.interrupts import raise_if_interrupted
 
 Advance = Callable[[int, str], None]  # number of finished units, and a note
 COMPILING = "compiling"
+_SLOW = 0.1  # units per second: no rate is shown of fewer
 
 
 @dataclass
@@ -71,7 +72,7 @@ def progress_bar(
                 advance=amount,
                 total=total if begun else None,
                 note=note if begun else note or waiting,
-                rate="" if rate is None else f"{rate:.1f}/s",
+                rate=f"{rate:.1f}/s" if rate and rate >= _SLOW else "",
             )
 
         yield advance

@@ -47,6 +47,8 @@ PHYSICS_IDENTIFIED = ModelId(kind="physics", simulator=IDENTIFIED)
 class FitEngine(Apart[Model]):
     """Physics with parameters identified on some pushes."""
 
+    is_kept = True
+
     pushes: Given
 
     @property
@@ -54,19 +56,11 @@ class FitEngine(Apart[Model]):
         """What is done."""
         return "identify"
 
-    def work(self, folder: Path) -> None:
-        """Identify the parameters."""
-        identify_into(self.pushes.store, folder)
-
     def run(self, runner: Runner) -> Model:
         """Return the model, identified where that is unfinished."""
-        self.work(runner.folder(self))
-        return self.model_in(runner.out)
-
-    def model_in(self, out: Path) -> Model:
-        """Return the model of a finished folder, among those of a runner."""
-        found = load_model(str(out / self.folder_name))
-        return replace(found, id=PHYSICS_IDENTIFIED)
+        folder = runner.folder(self)
+        identify_into(self.pushes.store, folder)
+        return replace(load_model(str(folder)), id=PHYSICS_IDENTIFIED)
 
 
 @dataclass(frozen=True)
@@ -163,6 +157,8 @@ def candidates_named(names: Sequence[str]) -> tuple[Candidate, ...]:
 class FitCandidate(Apart[Model]):
     """A candidate fitted to some pushes, around the engine identified on them."""
 
+    is_kept = stays_with_inputs = True
+
     engine: FitEngine
     candidate: Candidate
 
@@ -171,26 +167,19 @@ class FitCandidate(Apart[Model]):
         """The name in tables."""
         return self.candidate.identity.slug
 
-    def work(self, folder: Path) -> None:
-        """Fit the model."""
-        identified = read_identified(folder.parent / self.engine.folder_name)
-        pushes = self.engine.pushes.store
-        self.candidate.fit(pushes, identified.engine, folder)
-        jax.clear_caches()  # of programs for so many pushes; hundreds crash XLA
-
     def run(self, runner: Runner) -> Model:
         """Return the model, fitted where that is unfinished."""
-        self.work(runner.folder(self))
-        return self.model_in(runner.out)
-
-    def model_in(self, out: Path) -> Model:
-        """Return the model of a finished folder, among those of a runner."""
-        found = load_model(str(out / self.folder_name))
-        return replace(found, id=self.candidate.identity)
+        folder, pushes = runner.folder(self), self.engine.pushes.store
+        identified = read_identified(runner.folder(self.engine))
+        self.candidate.fit(pushes, identified.engine, folder)
+        jax.clear_caches()  # of programs for so many pushes; hundreds crash XLA
+        return replace(load_model(str(folder)), id=self.candidate.identity)
 
 
 class EvaluateFitted(Apart[Measurements]):
     """Errors and regions of all models on pushes that they were not fitted to."""
+
+    is_kept = stays_with_inputs = True
 
     engine: FitEngine
     fitted: tuple[FitCandidate, ...]
@@ -202,21 +191,16 @@ class EvaluateFitted(Apart[Measurements]):
         """What is done."""
         return "evaluate"
 
-    def work(self, folder: Path) -> None:
-        """Predict the pushes, and write the measurements."""
-        if (folder / MEASUREMENTS).is_file():
-            return
-        models = (each.model_in(folder.parent) for each in (self.engine, *self.fitted))
-        found = evaluate((load_model("physics"), *models), self.pushes.store)
-        folder.mkdir(parents=True, exist_ok=True)
-        found.write(folder / MEASUREMENTS)
-        jax.clear_caches()  # each fold compiles programs of its own
-
     def run(self, runner: Runner) -> Measurements:
-        """Return the errors."""
-        folder = runner.folder(self)
-        self.work(folder)
-        return read_measurements(folder / MEASUREMENTS).in_condition(self.condition)
+        """Return the errors, measured where that is unfinished."""
+        path = runner.folder(self) / MEASUREMENTS
+        if not path.is_file():
+            models = map(runner.result, (self.engine, *self.fitted))
+            found = evaluate((load_model("physics"), *models), self.pushes.store)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            found.write(path)
+            jax.clear_caches()  # each fold compiles programs of its own
+        return read_measurements(path).in_condition(self.condition)
 
 
 class WithUnions(Step[Measurements]):

@@ -1,6 +1,6 @@
 """How long the steps of studies took, and how long the others are expected to take."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,50 +30,55 @@ class Duration(msgspec.Struct, frozen=True):
 class Clock:
     """Times the steps of a runner and keeps their durations, one file for each.
 
-    A step that runs beside others gets its share of the time. A finished step that is
-    run again takes next to no time: the longest duration counts.
+    Steps that run at once share the time. A finished step that is run again takes next
+    to no time: the longest duration counts.
     """
 
-    out: Path  # of all run folders
+    out: Path | None = None  # of all run folders; None keeps nothing
     expected: Mapping[str, float] = field(default_factory=dict)
     """Seconds that each step is expected to take, by its key; none if it is missing."""
     _spent: dict[str, float] = field(default_factory=dict)
     _ended: set[str] = field(default_factory=set)
-    _current: tuple[str, ...] = ()
+    _running: dict[str, Step[Any]] = field(default_factory=dict)
+    _now: float = 0.0
 
     @contextmanager
-    def time(self, steps: Sequence[Step[Any]], *, are_done: bool) -> Iterator[None]:
-        """Time some work on steps, also if it fails.
-
-        Args:
-            steps: what is worked on; each gets its share of the time.
-            are_done: whether the steps are done after it.
-        """
-        shares = [self.expected.get(step.key, 0.0) or 1e-9 for step in steps]
-        self._current, start = tuple(step.key for step in steps), perf_counter()
-        has_ended = False
+    def time(self, step: Step[Any]) -> Iterator[None]:
+        """Time a step, also if it fails."""
+        self.begin(step)
+        is_done = False
         try:
             yield
-            has_ended = are_done
+            is_done = True
         finally:
-            took, whole = perf_counter() - start, sum(shares)
-            for step, share in zip(steps, shares, strict=True):
-                self._add(step, took * share / whole, has_ended=has_ended)
-            self._current = ()
+            self.end(step, is_done=is_done)
 
-    def _add(self, step: Step[Any], seconds: float, *, has_ended: bool) -> None:
+    def begin(self, step: Step[Any]) -> None:
+        """Note that a step runs from now on."""
+        self._tick()
+        self._running[step.key] = step
         before = self.duration(step)
         if step.key not in self._spent:
             is_open = before is not None and not before.has_ended
             self._spent[step.key] = before.seconds if before and is_open else 0.0
-        self._spent[step.key] += seconds
-        if has_ended:
+
+    def end(self, step: Step[Any], *, is_done: bool = True) -> None:
+        """Note that a step has ended, or was given up."""
+        self._tick()
+        del self._running[step.key]
+        if is_done:
             self._ended.add(step.key)
-        made = Duration(self._spent[step.key], has_ended)
-        if made.seconds < _SHORTEST:
+        before, made = self.duration(step), Duration(self._spent[step.key], is_done)
+        if self.out is None or made.seconds < _SHORTEST:
             return
         if before is None or not before.has_ended or before.seconds < made.seconds:
-            write_document(self._file(step), made)
+            write_document(self._file(self.out, step), made)
+
+    def _tick(self) -> None:
+        """Share the time since the last call among the steps that run."""
+        before, self._now = self._now, perf_counter()
+        for key in self._running:
+            self._spent[key] += (self._now - before) / len(self._running)
 
     def duration(self, step: Step[Any]) -> Duration | None:
         """Return how long a step took; None if it never ran.
@@ -81,19 +86,20 @@ class Clock:
         Raises:
             BadInput: the file is damaged.
         """
-        path = self._file(step)
+        if self.out is None or not (path := self._file(self.out, step)).is_file():
+            return None
         remedy = "delete it; only this duration is lost"
-        return read_document(path, Duration, remedy=remedy) if path.is_file() else None
+        return read_document(path, Duration, remedy=remedy)
 
-    def remaining(self, done: float = 0.0) -> float:
-        """Return the seconds that the steps which have not ended will take.
-
-        Args:
-            done: the share of the current steps that is done.
-        """
-        left = sum(s for key, s in self.expected.items() if key not in self._ended)
-        left -= done * sum(self.expected.get(key, 0.0) for key in self._current)
-        return left * self._pace
+    def remaining(self) -> float:
+        """Return the seconds that the steps which have not ended will take."""
+        self._tick()
+        pace = self._pace
+        return sum(
+            max(0.0, seconds * pace - self._spent.get(key, 0.0))
+            for key, seconds in self.expected.items()
+            if key not in self._ended
+        )
 
     @property
     def _pace(self) -> float:
@@ -103,8 +109,9 @@ class Clock:
         expected = sum(self.expected[key] for key in known)
         return (took + _DOUBTED) / (expected + _DOUBTED)
 
-    def _file(self, step: Step[Any]) -> Path:
-        return self.out / DURATIONS / f"{step.folder_name}.json"
+    @staticmethod
+    def _file(out: Path, step: Step[Any]) -> Path:
+        return out / DURATIONS / f"{step.folder_name}.json"
 
 
 def in_words(seconds: float) -> str:

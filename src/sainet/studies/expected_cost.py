@@ -20,7 +20,7 @@ from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
 from sainet.studies.runner import Runner
 from sainet.studies.simulated_control import RunTrials
-from sainet.studies.steps import First, Join, Simulate, Step
+from sainet.studies.steps import Apart, First, Join, Simulate
 from sainet.studies.study import Plan, Scope, Study
 
 TRIALS = {"quick": (2, 5), "paper": (50, 60)}  # and the most pushes of each
@@ -29,8 +29,10 @@ _PROCESS = ModelId(kind="gp", simulator=SIMULATORS["planar"], features="angle")
 _SEED = 5
 
 
-class FitProcess(Step[Model]):
+class FitProcess(Apart[Model]):
     """A Gaussian process of pushes, around the engine with assumed properties."""
+
+    is_kept = True
 
     pushes: First
 

@@ -12,7 +12,7 @@ from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId
 from sainet.studies.paper_setup import physics, scaled
 from sainet.studies.runner import Runner
-from sainet.studies.steps import Evaluate, First, Join, Simulate, Step, Train
+from sainet.studies.steps import Apart, Evaluate, First, Join, Simulate, Step, Train
 from sainet.studies.study import Change, Choice, Plan, Scope, Study
 
 
@@ -54,8 +54,10 @@ FEW = {"quick": 10, "paper": 25}
 _TUNED = ModelId(kind="sain", name="sain-tuned")
 
 
-class Record(Step[Store]):
+class Record(Apart[Store]):
     """The recorded pushes of a surrogate robot."""
+
+    is_kept = True
 
     robot: Robot
     pushes: Simulate

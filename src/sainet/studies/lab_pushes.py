@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,6 +70,8 @@ MUJOCO: Need = _mujoco
 class Collect(steps.Apart[Store]):
     """Pushes that the robot of a virtual lab records."""
 
+    is_kept = True
+
     config: CollectConfig
 
     @property
@@ -78,10 +79,6 @@ class Collect(steps.Apart[Store]):
         """The lab and its surface."""
         again = "-repeated" if self.config.repeats > 1 else ""
         return f"lab-{self.config.lab}-{self.config.surface}{again}"
-
-    def work(self, folder: Path) -> None:
-        """Record what is missing."""
-        collect(self.config, folder)
 
     def run(self, runner: "Runner") -> Store:
         """Return the dataset of the pushes without trouble."""

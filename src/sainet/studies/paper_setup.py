@@ -22,7 +22,8 @@ SAIN_BULLET, SAIN, SAIN_TRUE = (
 )
 NETWORKS = (IN, SAIN_BULLET, SAIN, SAIN_TRUE)
 _QUICK_ITERATIONS = 20
-_MOST_IN_CHUNK = 250  # pushes
+_MANY = 500  # pushes
+_QUICK_BATCH = 40  # pushes
 _TEST_SEED, _VALIDATION_SEED = 1, 2
 
 
@@ -39,8 +40,11 @@ SIZES = {"quick": Sizes(120, 40, 60), "paper": Sizes(4500, 500, 10_000)}
 
 
 def chunk_of(pushes: int) -> int:
-    """Return the pushes in a chunk of a dataset: whole chunks are simulated at once."""
-    return min(_MOST_IN_CHUNK, -(-pushes // 2))
+    """Return the pushes in a chunk of a dataset: whole chunks are simulated at once.
+
+    Datasets share compiled programs if their chunks are equal.
+    """
+    return 250 if pushes >= _MANY else 20
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,9 @@ class PaperSetup:
     @property
     def recipe(self) -> Recipe:
         """The paper's recipe, with the iterations of the scale."""
-        return PAPER.changed(iterations=self.sizes.iterations)
+        found = PAPER.changed(iterations=self.sizes.iterations)
+        is_quick = self.scale == "quick"
+        return found.changed(batch_size=_QUICK_BATCH) if is_quick else found
 
     def training_pushes(self) -> steps.Simulate:
         """Return the training pushes, with the predictions of every internal engine."""

@@ -5,8 +5,6 @@ identified on the first few pushes, drawn at random; then pushes of the pool are
 those that `choose_pushes` names or others at random, and the process is fitted again.
 """
 
-from pathlib import Path
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -50,14 +48,23 @@ Errors = Float[np.ndarray, "push 2"]  # mm, degrees
 class Draw(Apart[Measurements]):
     """Errors of both orders on one surface, from one draw of tests and first pushes."""
 
+    is_kept = True
+
     pushes: Given
     number: int
     scale: Scale
 
-    def work(self, folder: Path) -> None:
-        """Fit the processes, and write the measurements."""
-        if (folder / MEASUREMENTS).is_file():
-            return
+    def run(self, runner: Runner) -> Measurements:
+        """Return the errors, measured where that is unfinished."""
+        path = runner.folder(self) / MEASUREMENTS
+        if not path.is_file():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._measure().write(path)
+            jax.clear_caches()
+        return read_measurements(path)
+
+    def _measure(self) -> Measurements:
+        """Return the errors of processes that are fitted to ever more pushes."""
         counts, store = COUNTS[self.scale], self.pushes.store
         pool, tests = split_rows(store.repeats(), TESTS, self.number)
         rng = np.random.default_rng([_STREAM, self.number])
@@ -72,16 +79,7 @@ class Draw(Apart[Measurements]):
             model: _errors(ends, order, tests, counts, chosen=model == CHOSEN)
             for model in (RANDOM, CHOSEN)
         }
-        measured = _measured(store, tests, errors, counts, self.number)
-        folder.mkdir(parents=True, exist_ok=True)
-        measured.write(folder / MEASUREMENTS)
-        jax.clear_caches()
-
-    def run(self, runner: Runner) -> Measurements:
-        """Return the errors."""
-        folder = runner.folder(self)
-        self.work(folder)
-        return read_measurements(folder / MEASUREMENTS)
+        return _measured(store, tests, errors, counts, self.number)
 
 
 def _errors(

@@ -28,7 +28,7 @@ from sainet.studies.recorded_models import (
     surfaces_of,
 )
 from sainet.studies.runner import Runner
-from sainet.studies.steps import Evaluate, Given, Join, Step
+from sainet.studies.steps import Apart, Evaluate, Given, Join, Step
 from sainet.studies.study import RECORDED, Plan, Scope, Study
 
 FOLDS = {"quick": 2, "paper": 5}
@@ -100,7 +100,7 @@ class BySurface(Step[Measurements]):
         return whole.in_conditions((*own, everywhere), places)
 
 
-class EndErrors(Step[EndOffsets]):
+class EndErrors(Apart[EndOffsets]):
     """Signed errors of an engine at the ends of pushes."""
 
     model: Step[Model]

@@ -1,32 +1,33 @@
 """Runs the steps of studies in order, each once, and reports their progress."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from graphlib import TopologicalSorter
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from sainet.learning.log import read_log
-from sainet.runs.workers import each_done, worker_lost
+from sainet.runs.workers import worker_lost
 from sainet.studies.durations import Clock
-from sainet.studies.steps import Apart, Step, Train
+from sainet.studies.steps import Place, Step, Train, all_steps
 
+MANY = 1_000_000  # steps at once: all that can run
 _LOOK_AGAIN = 1.0  # s
 T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Progress:
-    """An event: how much of a step is done."""
+    """An event: how much of some work is done."""
 
     title: str
     done: int
     total: int
     note: str = ""
-    has_ended: bool = False  # no further event of this step
+    has_ended: bool = False  # no further event of this work
     left: float = 0.0  # s, that all unfinished steps are expected to take
 
 
@@ -35,7 +36,7 @@ Report = Callable[[Progress], None]
 
 @dataclass
 class Bar:
-    """Counts what is done of one step, and reports it."""
+    """Counts what is done of some work, and reports it."""
 
     title: str
     total: int
@@ -51,24 +52,26 @@ class Bar:
     def reach(self, done: int, note: str = "") -> None:
         """Report that so much is done in all."""
         self.done, self.note = done, note
-        left = self.clock.remaining(done / self.total if self.total else 0.0)
+        left = self.clock.remaining()
         self.report(Progress(self.title, done, self.total, note, left=left))
 
 
 @dataclass
 class Runner:
-    """Runs steps in the order of their inputs; finished ones are not repeated."""
+    """Runs steps after their inputs; finished ones are not repeated.
+
+    Other processes run several steps at once: first those that are needed for the
+    result that was asked for, then those of `ahead`.
+    """
 
     out: Path  # of all run folders
-    executor: Executor | None = None  # simulates and runs episodes; None: this process
+    executor: Executor | None = None  # None: everything runs in this process
     report: Report = lambda event: None  # noqa: E731
-    trainers: Executor | None = None  # trains networks at once; None: one by one
-    expected: Mapping[str, float] = field(default_factory=dict)  # s, by keys of steps
+    at_once: int = 0  # steps that the executor has at most; 0: steps run here
+    ahead: Sequence[Step[Any]] = ()  # of which results will be asked for, in this order
+    clock: Clock = field(default_factory=Clock)
     _results: dict[str, object] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Keep the durations of steps beside their run folders."""
-        self.clock = Clock(self.out, self.expected)
+    _running: dict[Future[Any], Step[Any]] = field(default_factory=dict)
 
     def folder(self, step: Step[Any]) -> Path:
         """Return the run folder of a step."""
@@ -78,10 +81,19 @@ class Runner:
         """Return the result of a step, which is run first if it was not.
 
         Raises:
-            SainetError: whatever the step raises.
+            SainetError: whatever a step raises; or a process was ended from outside.
         """
-        if step.key not in self._results:
-            self._run(step)
+        try:
+            if self.executor is None or not self.at_once:
+                for each in self._unknown(step):
+                    self._run_here(each)
+            elif step.key not in self._results:
+                self._run_at_once(step, self.executor)
+        except BrokenProcessPool:
+            raise worker_lost() from None
+        finally:
+            if step.key not in self._results:
+                self._give_up()
         return cast("T", self._results[step.key])
 
     @contextmanager
@@ -92,84 +104,93 @@ class Runner:
         yield bar
         self.report(Progress(title, total, total, bar.note, has_ended=True))
 
-    def _run(self, last: Step[Any]) -> None:
-        """Run a step after all that it needs, directly or not."""
-        steps: dict[str, Step[Any]] = {last.key: last}
-        order: TopologicalSorter[str] = TopologicalSorter()
-        for step in (waiting := [last]):
-            needed = [each for each in step.inputs if each.key not in self._results]
-            order.add(step.key, *(each.key for each in needed))
-            waiting += [each for each in needed if each.key not in steps]
-            steps |= {each.key: each for each in needed}
-        order.prepare()
-        while order.is_active():
-            ready = order.get_ready()
-            self._train([s for k in ready if isinstance(s := steps[k], Train)])
-            self._work([s for k in ready if isinstance(s := steps[k], Apart)])
-            for key in ready:
-                with self.clock.time([steps[key]], are_done=True):
-                    self._results[key] = steps[key].run(self)
-            order.done(*ready)
+    def _unknown(self, *lasts: Step[Any]) -> list[Step[Any]]:
+        """Return steps and all that they need, inputs first, without known results."""
+        return list(all_steps(lasts, known=self._results).values())
 
-    def _work(self, steps: Sequence[Apart[Any]]) -> None:
-        """Do the work of several steps at once."""
-        if self.executor is None or steps == steps[:1]:
-            return
-        jobs = [(step, self.folder(step), index) for index, step in enumerate(steps)]
-        title = f"{steps[0].name} and {len(steps) - 1} more"
-        with self._timed(steps), self.bar(title, len(steps)) as bar:
-            for _ in each_done(self.executor, _work_at, jobs):
-                bar.add(1)
+    def _run_here(self, step: Step[Any]) -> None:
+        with self.clock.time(step):
+            self._results[step.key] = step.run(self)
 
-    def _train(self, steps: Sequence[Train]) -> None:
-        """Train several networks at once; finished ones and a single one need no pool.
+    def _run_at_once(self, last: Step[Any], executor: Executor) -> None:
+        """Run a step after all that it needs, and steps ahead beside them."""
+        needed, every = self._unknown(last), self._unknown(last, *self.ahead)
+        start = partial(self._start, every, executor)
+        while last.key not in self._results:
+            start()
+            if spread := self._spread_ready(needed):
+                self._run_here(spread[0])
+            elif last.key not in self._results:
+                self._wait(needed, start)
 
-        A batch that is split over cores waits for the slowest of them at every
-        iteration. Networks that do not depend on each other never wait.
+    def _spread_ready(self, steps: Sequence[Step[Any]]) -> list[Step[Any]]:
+        """Return those of steps that can run now, over all processes."""
+        return [s for s in steps if s.place is Place.SPREAD and self._can_run(s)]
 
-        Raises:
-            SainetError: what `fit` raises, of the first that fails; or a process was
-                ended from outside.
-        """
-        left = [step for step in steps if not step.is_finished(self)]
-        if self.trainers is None or left == left[:1]:
-            return
-        total = sum(step.iterations for step in left)
-        futures: dict[Future[Any], Train] = {}
-        try:
-            title = f"Training {len(left)} networks"
-            with self._timed(left), self.bar(title, total) as bar:
-                for step in left:
-                    futures[self.trainers.submit(step.fitting(self))] = step
-                waiting = set(futures)
-                while waiting:
-                    done, waiting = wait(waiting, _LOOK_AGAIN, FIRST_COMPLETED)
-                    for future in done:
-                        future.result()
-                    bar.reach(*self._look(futures))
-        except BrokenProcessPool:
-            raise worker_lost() from None
-        finally:
-            for future in futures:
-                future.cancel()
+    def _can_run(self, step: Step[Any]) -> bool:
+        """Return whether a step has no result yet, but all its inputs have."""
+        known = self._results
+        return step.key not in known and all(each.key in known for each in step.inputs)
 
-    def _timed(self, steps: Sequence[Step[Any]]) -> AbstractContextManager[None]:
-        """Time work that others do; `run` ends the steps."""
-        return self.clock.time(steps, are_done=False)
+    def _start(self, steps: Sequence[Step[Any]], executor: Executor) -> None:
+        """Give steps to the executor, as many as it takes; run light ones here."""
+        begun = {step.key for step in self._running.values()}
+        for step in steps:
+            if step.key in begun or not self._can_run(step):
+                continue
+            if step.place is Place.HERE:
+                self._run_here(step)
+            elif step.place is Place.APART and len(self._running) < self.at_once:
+                self._running[executor.submit(run_alone, step, self.out)] = step
+                self.clock.begin(step)
 
-    def _look(self, futures: dict[Future[Any], Train]) -> tuple[int, str]:
-        """Return the iterations so far, and the losses of those under way."""
-        total, losses = 0, []
-        for future, step in futures.items():
-            if future.done():
-                total += step.iterations
-            elif lines := read_log(self.folder(step)):
-                total += lines[-1].iteration
-                losses.append(f"{lines[-1].loss:.3g}")
-        return total, f"losses {', '.join(losses)}" if losses else ""
+    def _wait(self, needed: Sequence[Step[Any]], start: Callable[[], None]) -> None:
+        """Wait until nothing needed is running, or all processes are needed for one."""
+        apart = [s for s in needed if s.place is Place.APART]
+        left = [s for s in apart if s.key not in self._results]
+        with self.bar(_title(left), len(left)) as bar:
+            while bar.done < len(left) and not self._spread_ready(needed):
+                done, _ = wait(self._running, _LOOK_AGAIN, FIRST_COMPLETED)
+                for future in done:
+                    self._take(future)
+                start()
+                ended = sum(step.key in self._results for step in left)
+                bar.reach(ended, self._note())
+
+    def _take(self, future: Future[Any]) -> None:
+        """Take the result of a step from the executor, or from its run folder."""
+        result = future.result()
+        step = self._running.pop(future)
+        self.clock.end(step)
+        if step.is_kept:  # and finished, which needs no bar
+            result = Runner(self.out, _results=self._results).result(step)
+        self._results[step.key] = result
+
+    def _note(self) -> str:
+        """Return what is running, and how far networks are."""
+        return ", ".join(map(self._progress, self._running.values()))
+
+    def _progress(self, step: Step[Any]) -> str:
+        lines = read_log(self.folder(step)) if isinstance(step, Train) else ()
+        return f"{step.name} at {lines[-1].iteration:,}" if lines else step.name
+
+    def _give_up(self) -> None:
+        """Cancel what has not begun; what has begun resumes."""
+        for future, step in self._running.items():
+            future.cancel()
+            self.clock.end(step, is_done=False)
+        self._running.clear()
 
 
-def _work_at(step: Apart[Any], folder: Path, index: int) -> int:
-    """Do the work of a step (the job of a worker) and return its index."""
-    step.work(folder)
-    return index
+def _title(steps: Sequence[Step[Any]]) -> str:
+    return f"{steps[0].name} and {len(steps) - 1} more" if steps[1:] else steps[0].name
+
+
+def run_alone(step: Step[T], out: Path) -> T | None:
+    """Run a step whose inputs are finished; the job of another process.
+
+    Returns:
+        The result, unless it is kept in the run folder.
+    """
+    found = Runner(out).result(step)
+    return None if step.is_kept else found

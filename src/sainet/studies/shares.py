@@ -13,30 +13,12 @@ from typing import Any
 from sainet.datasets.schema import ARRAYS
 from sainet.runs.shards import Shard, Share, collect, files_in, open_share
 from sainet.studies.durations import Clock
-from sainet.studies.expected_cost import FitProcess
-from sainet.studies.fine_tuning import Record
 from sainet.studies.runner import Runner
-from sainet.studies.simulated_control import RunTrials
-from sainet.studies.steps import (
-    Apart,
-    Derive,
-    Identify,
-    Simulate,
-    Step,
-    Train,
-    WithBystander,
-)
-from sainet.studies.study import all_steps
-
-# Steps whose results are kept in run folders. All others are made in memory, quickly.
-KEPT = (
-    *(Apart, Derive, FitProcess, Identify, Record, RunTrials, Simulate, Train),
-    WithBystander,
-)
+from sainet.studies.steps import Step, all_steps
 
 
 class Several(Step[None]):
-    """Several steps, of which networks and folds are fitted at once."""
+    """Several steps, which run at once where they can."""
 
     parts: tuple[Step[Any], ...]
 
@@ -65,7 +47,7 @@ class Shared:
 def kept_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
     """Return all steps with run folders, as `all_steps` does."""
     every = all_steps(lasts)
-    return {key: step for key, step in every.items() if isinstance(step, KEPT)}
+    return {key: step for key, step in every.items() if step.is_kept}
 
 
 def unfinished(steps: Iterable[Step[Any]], out: Path) -> list[Step[Any]]:
@@ -73,7 +55,7 @@ def unfinished(steps: Iterable[Step[Any]], out: Path) -> list[Step[Any]]:
     clock, found = Clock(out), []
     for step in steps:
         took = clock.duration(step)
-        if took is None or not took.has_ended or not isinstance(step, KEPT):
+        if took is None or not took.has_ended or not step.is_kept:
             found.append(step)
     return found
 
@@ -84,7 +66,7 @@ def _nearest_kept(step: Step[Any]) -> Iterator[Step[Any]]:
     What those need in turn is finished with them.
     """
     for each in step.inputs:
-        if isinstance(each, KEPT):
+        if each.is_kept:
             yield each
         else:
             yield from _nearest_kept(each)
@@ -99,13 +81,10 @@ def divided(steps: Mapping[str, Step[Any]], shard: Shard) -> list[Step[Any]]:
     index: dict[str, int] = {}
     count = 0
     for key, step in steps.items():
-        before = [
-            index[each.key]
-            for each in _nearest_kept(step)
-            if isinstance(step, Apart) and isinstance(each, Apart)
-        ]
-        index[key] = before[0] if before else count
-        count += not before
+        if step.stays_with_inputs:
+            index[key] = index[next(_nearest_kept(step)).key]
+        else:
+            index[key], count = count, count + 1
     return [step for key, step in steps.items() if shard.takes(index[key])]
 
 
@@ -142,18 +121,14 @@ def run_share(
 
 
 def _ready(own: Iterable[Step[Any]], share: Share) -> list[Step[Any]]:
-    """Return the next step that can run, with all others that can run at its side."""
+    """Return the steps that can run."""
     finished = share.finished()
-    ready = [
+    return [
         step
         for step in own
         if step.folder_name not in finished
         and all(each.folder_name in finished for each in _nearest_kept(step))
     ]
-    for kind in (Train, Apart):
-        if ready and isinstance(ready[0], kind):
-            return [step for step in ready if isinstance(step, kind)]
-    return ready[:1]
 
 
 @contextmanager

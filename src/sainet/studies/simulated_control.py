@@ -18,7 +18,7 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.runner import Bar, Runner
-from sainet.studies.steps import Join, Load, Step
+from sainet.studies.steps import Join, Load, Place, Step
 from sainet.studies.study import Plan, Scope, Study
 
 TRIALS = {"quick": (2, 5), "paper": (100, 60)}  # and the most pushes of each
@@ -31,6 +31,8 @@ _FACTORS = ("world", "goals", "planner", "given_properties", "disks")
 class RunTrials(Step[Measurements]):
     """Control trials of models on the same goals."""
 
+    is_kept = True
+
     models: tuple[Step[Model], ...]  # loaded by name, or made by a step
     config: ControlConfig  # of every model
     condition: Condition
@@ -39,6 +41,11 @@ class RunTrials(Step[Measurements]):
     def name(self) -> str:
         """The condition."""
         return self.condition.label
+
+    @property
+    def place(self) -> Place:
+        """Over all processes: each runs episodes."""
+        return Place.SPREAD
 
     def run(self, runner: Runner) -> Measurements:
         """Return the outcomes; finished episodes are kept."""

@@ -1,11 +1,11 @@
 """Steps of studies: frozen settings and inputs, whose hash names the run folder."""
 
 import abc
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
+from enum import Enum
 from functools import cached_property, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, dataclass_transform
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, dataclass_transform
 
 from msgspec import structs
 
@@ -22,7 +22,6 @@ from sainet.identification.identify import identify_into
 from sainet.learning.fit import FitResult, fit
 from sainet.learning.log import loss_note
 from sainet.learning.recipes import FromModel, Recipe
-from sainet.models.card import CARD
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
@@ -32,13 +31,27 @@ if TYPE_CHECKING:
     from sainet.studies.runner import Runner
 
 T = TypeVar("T")
+_FEW = 250  # pushes: a dataset of more is made in pieces
 _DIGEST = 10  # characters of a hash in the name of a folder
+
+
+class Place(Enum):
+    """Where a step runs."""
+
+    HERE = "in the process of the runner, in next to no time"
+    APART = "in one other process, beside other steps"
+    SPREAD = "in pieces, over all processes"
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 @dataclass(frozen=True, eq=False)
 class Step(abc.ABC, Generic[T]):
     """A piece of work, run once for equal settings and inputs: a frozen dataclass."""
+
+    is_kept: ClassVar[bool] = False
+    """Whether the result is kept in the run folder."""
+    stays_with_inputs: ClassVar[bool] = False
+    """Whether the shard that runs what it needs runs it, too: the steps of a fold."""
 
     def __init_subclass__(cls) -> None:
         """Make the class a frozen dataclass."""
@@ -49,6 +62,11 @@ class Step(abc.ABC, Generic[T]):
     def name(self) -> str:
         """The beginning of the name of the run folder."""
         return type(self).__name__.lower()
+
+    @property
+    def place(self) -> Place:
+        """Where it runs."""
+        return Place.HERE
 
     @abc.abstractmethod
     def run(self, runner: "Runner") -> T:
@@ -76,12 +94,38 @@ class Step(abc.ABC, Generic[T]):
         return "-".join([*words.split(), self.key])
 
 
-class Apart(Step[T]):
-    """A step whose work other processes can do, each that of one such step."""
+def all_steps(
+    lasts: Iterable[Step[Any]], *, known: Container[str] = ()
+) -> dict[str, Step[Any]]:
+    """Return steps and all that they need, by their keys: inputs first.
 
-    @abc.abstractmethod
-    def work(self, folder: Path) -> None:
-        """Do the work in the run folder, so that `run` finds it finished."""
+    The order depends only on the steps, so that all shards count them alike.
+
+    Args:
+        lasts: steps.
+        known: keys of steps that are left out, with what only they need.
+    """
+    found: dict[str, Step[Any]] = {}
+    for step in lasts:
+        _add(step, found, known)
+    return found
+
+
+def _add(step: Step[Any], found: dict[str, Step[Any]], known: Container[str]) -> None:
+    if step.key in found or step.key in known:
+        return
+    for each in step.inputs:
+        _add(each, found, known)
+    found[step.key] = step
+
+
+class Apart(Step[T]):
+    """A step that runs in one other process, if there are some."""
+
+    @property
+    def place(self) -> Place:
+        """In one other process."""
+        return Place.APART
 
 
 class Given(Step[Store]):
@@ -101,8 +145,15 @@ class Given(Step[Store]):
 class Simulate(Step[Store]):
     """A simulated dataset."""
 
+    is_kept = True
+
     label: str
     config: GenerateConfig
+
+    @property
+    def place(self) -> Place:
+        """In one other process if it is small."""
+        return Place.APART if self.config.pushes <= _FEW else Place.SPREAD
 
     @property
     def name(self) -> str:
@@ -143,8 +194,10 @@ class Rest(Step[Store]):
         return store.take(range(self.count, store.info.pushes))
 
 
-class Derive(Step[Store]):
+class Derive(Apart[Store]):
     """A dataset that a function makes of another one."""
+
+    is_kept = True
 
     pushes: Step[Store]
 
@@ -158,8 +211,10 @@ class Derive(Step[Store]):
         return derive(store, folder, {"step": self.key}, self.change)
 
 
-class WithBystander(Step[Store]):
+class WithBystander(Apart[Store]):
     """The same pushes, beside each a disk that nothing touches."""
+
+    is_kept = True
 
     pushes: Step[Store]
 
@@ -188,8 +243,10 @@ class Load(Step[Model]):
         return replace(load_model(self.source, engine=self.engine), id=self.id)
 
 
-class Identify(Step[Model]):
+class Identify(Apart[Model]):
     """Physics with parameters identified on pushes."""
+
+    is_kept = True
 
     id: ModelId
     pushes: Step[Store]
@@ -201,8 +258,10 @@ class Identify(Step[Model]):
         return replace(load_model(str(folder)), id=self.id)
 
 
-class Train(Step[Model]):
+class Train(Apart[Model]):
     """One training run of a network."""
+
+    is_kept = True
 
     id: ModelId  # in tables; its simulator is the internal engine
     pushes: Step[Store]
@@ -224,12 +283,8 @@ class Train(Step[Model]):
         """Return the training pushes."""
         return runner.result(self.pushes)
 
-    def is_finished(self, runner: "Runner") -> bool:
-        """Return whether the folder has a network; `run` checks which."""
-        return (runner.folder(self) / CARD).is_file()
-
     def fitting(self, runner: "Runner") -> "partial[FitResult]":
-        """Return the call that trains the network, which another process can make."""
+        """Return the call that trains the network."""
         recipe = self.recipe
         if self.start is not None:
             start = FromModel(str(runner.folder(self.start)))
@@ -256,7 +311,7 @@ class Train(Step[Model]):
         return replace(load_model(str(runner.folder(self))), id=self.id)
 
 
-class Evaluate(Step[Measurements]):
+class Evaluate(Apart[Measurements]):
     """Errors of models on the same pushes.
 
     Models of one identity are training runs of one network.

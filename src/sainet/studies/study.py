@@ -167,28 +167,6 @@ def last_steps(plans: Iterable[Plan]) -> Iterator[Step[Any]]:
             yield plan.as_trained
 
 
-def all_steps(lasts: Iterable[Step[Any]]) -> dict[str, Step[Any]]:
-    """Return all steps, by their keys: inputs before what needs them.
-
-    The order depends only on the steps, so that all shards count them alike.
-    """
-    found: dict[str, Step[Any]] = {}
-    for step in lasts:
-        for each in _needed(step, set()):
-            found.setdefault(each.key, each)
-    return found
-
-
-def _needed(step: Step[Any], seen: set[str]) -> Iterator[Step[Any]]:
-    """Yield a step after all that it needs, each once."""
-    if step.key in seen:
-        return
-    seen.add(step.key)
-    for each in step.inputs:
-        yield from _needed(each, seen)
-    yield step
-
-
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """A question, and how it is answered."""
