@@ -310,8 +310,9 @@ CONNECTIONS = {
     "contact networks and arrangements of disks": 165,
     # Also durations, the report of all studies, and fewer training runs.
     "the whole paper": 250,
-    # Shares of datasets, trials and evaluations, and the options of five commands.
-    "many machines": 225,
+    # Shares of datasets, trials and evaluations, the options of five commands, and
+    # where steps run, which stood in studies/shares.py before.
+    "many machines": 245,
 }
 # How to count, the limit today, and the target. A limit is lowered, never raised.
 COUNTS = {
@@ -379,8 +380,8 @@ COUNTS = {
     ),
     "code lines of many machines": (
         lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),
-        490,
-        490,
+        470,
+        470,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),

@@ -19,7 +19,7 @@ from sainet.runs.workers import core_count
 from sainet.studies import STUDIES, load_study
 from sainet.studies.durations import Clock
 from sainet.studies.effort import RATES, Rate, Rates, effort
-from sainet.studies.steps import all_steps
+from sainet.studies.runner import all_steps
 from sainet.studies.study import STEPS, Scope, last_steps
 
 TARGET = Path(__file__).parents[1] / "src" / "sainet" / "studies" / RATES
@@ -28,8 +28,8 @@ TARGET = Path(__file__).parents[1] / "src" / "sainet" / "studies" / RATES
 def rate_of(measured: list[tuple[float, float]]) -> Rate:
     """Fit constant and unit, both at least 0, to sizes and seconds, relative."""
     size, seconds = np.array(measured).T
-    design = np.column_stack([np.ones_like(size), size]) / seconds[:, None]
-    design[:, 0] *= len(set(size)) > 1  # one size says nothing about others
+    has_sizes = len(set(size)) > 1  # one size says nothing about others
+    design = np.column_stack([np.full_like(size, has_sizes), size]) / seconds[:, None]
     return Rate(*nnls(design, np.ones_like(seconds))[0].tolist())
 
 
@@ -39,9 +39,8 @@ def main(out: str, recorded: str) -> None:
     plans = (load_study(name).plan(scope) for name in STUDIES)
     measured: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for step in all_steps(last_steps(plans)).values():
-        took, work = clock.duration(step), effort(step)
-        if took is not None and took.has_ended:
-            measured[work.kind].append((work.size, took.seconds))
+        if (took := clock.duration(step)) and took.has_ended:
+            measured[effort(step).kind].append((effort(step).size, took.seconds))
     kinds = {kind: rate_of(pairs) for kind, pairs in sorted(measured.items())}
     found = Rates(processor=processor(), cores=core_count(), kinds=kinds)
     write_document(TARGET, found)

@@ -10,10 +10,10 @@ from sainet.studies import STUDIES, durations, effort, load_study
 from sainet.studies.durations import DURATIONS, Clock, Duration, in_words
 from sainet.studies.effort import Rate, Rates, expected_seconds, measured_rates
 from sainet.studies.lab_pushes import Collect
-from sainet.studies.runner import Runner
+from sainet.studies.runner import Runner, all_steps
 from sainet.studies.shares import unfinished
 from sainet.studies.simulated_control import RunTrials
-from sainet.studies.steps import First, Simulate, Step, Train, all_steps
+from sainet.studies.steps import First, Simulate, Step, Train
 from sainet.studies.study import Scope, last_steps
 
 

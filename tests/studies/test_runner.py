@@ -291,9 +291,8 @@ def test_fine_tuning_starts_from_the_network_of_the_same_seed(store, tmp_path):
     first = Train(IN, Given(store), CONFIG.changed(seed=3))
     second = Train(IN, Given(store), CONFIG.changed(seed=3), start=first)
     assert list(second.inputs)[1:] == [first]
-    runner._results[second.pushes.key] = store
-    _, _, recipe, out = second.fitting(runner).args
-    assert recipe.start.model == str(runner.folder(first)) != str(out)
+    recipe = second.recipe_in(runner)
+    assert recipe.start.model == str(runner.folder(first)) != str(runner.folder(second))
 
 
 def test_a_failed_training_run_is_reported_unchanged(store, tmp_path):

@@ -106,8 +106,8 @@ class Reproduce:
         """Return the seconds that each unfinished step should take, and print a sum."""
         from sainet.studies.durations import in_words
         from sainet.studies.effort import expected_seconds
+        from sainet.studies.runner import all_steps
         from sainet.studies.shares import divided, kept_steps, unfinished
-        from sainet.studies.steps import all_steps
         from sainet.studies.study import STEPS
 
         if shard is None:
@@ -130,7 +130,7 @@ class Reproduce:
     ) -> None:
         """Write the report of all studies in the folder."""
         from sainet.report.pages.page import REPORT, write_report
-        from sainet.studies.steps import all_steps
+        from sainet.studies.runner import all_steps
         from sainet.studies.whole_report import whole_report
 
         steps = all_steps(lasts).values()

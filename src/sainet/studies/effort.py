@@ -17,6 +17,7 @@ from sainet.scenes.quantities import Finite
 from sainet.scenes.scene import TIME_STEP
 from sainet.studies import cross_validation, fine_tuning, simulated_control, steps
 from sainet.studies.lab_pushes import Collect
+from sainet.studies.paper_setup import WithBystander
 from sainet.studies.steps import Step
 
 RATES = "durations.json"
@@ -129,7 +130,7 @@ def _(step: simulated_control.RunTrials) -> Effort:
     return Effort(f"RunTrials {step.config.planner}", size)
 
 
-@effort.register(steps.WithBystander)
+@effort.register(WithBystander)
 @effort.register(steps.Identify)
 @effort.register(cross_validation.FitEngine)
 @effort.register(cross_validation.EvaluateFitted)

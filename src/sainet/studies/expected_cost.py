@@ -7,7 +7,6 @@ by the mean cost over where the process expects the disks.
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 from sainet.control.config import ControlConfig
 from sainet.datasets.config import GenerateConfig
@@ -25,7 +24,8 @@ from sainet.studies.study import Plan, Scope, Study
 
 TRIALS = {"quick": (2, 5), "paper": (50, 60)}  # and the most pushes of each
 PUSHES = {"quick": (20,), "paper": (50, 300)}
-_PROCESS = ModelId(kind="gp", simulator=SIMULATORS["planar"], features="angle")
+_SIMULATOR, _SETTINGS = SIMULATORS["planar"], ProcessSettings(features="angle")
+_PROCESS = ModelId(kind="gp", simulator=_SIMULATOR, features=_SETTINGS.features)
 _SEED = 5
 
 
@@ -43,10 +43,8 @@ class FitProcess(Apart[Model]):
 
     def run(self, runner: Runner) -> Model:
         """Return the process, fitted where that is unfinished."""
-        folder: Path = runner.folder(self)
-        engine = InternalEngine(SIMULATORS["planar"])
-        settings = ProcessSettings(features="angle")
-        fit_process(runner.result(self.pushes), folder, engine, settings)
+        folder, pushes = runner.folder(self), runner.result(self.pushes)
+        fit_process(pushes, folder, InternalEngine(_SIMULATOR), _SETTINGS)
         return replace(load_model(str(folder)), id=_PROCESS)
 
 

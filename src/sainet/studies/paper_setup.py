@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from msgspec import structs
 
+from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS
@@ -13,6 +14,7 @@ from sainet.learning.recipes import FINE_TUNING, PAPER, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.library import PHYSICS, physics_simulator
 from sainet.studies import Scale, steps
+from sainet.studies.runner import Runner
 from sainet.worlds.config import SetupName
 
 IN = ModelId(kind="in")
@@ -37,6 +39,26 @@ class Sizes:
 
 
 SIZES = {"quick": Sizes(120, 40, 60), "paper": Sizes(4500, 500, 10_000)}
+
+
+class WithBystander(steps.Apart[Store]):
+    """The same pushes, beside each a disk that nothing touches."""
+
+    is_kept = True
+
+    pushes: steps.Step[Store]
+
+    @property
+    def name(self) -> str:
+        """The pushes and the bystander."""
+        return f"{self.pushes.name}-bystander"
+
+    def run(self, runner: Runner) -> Store:
+        """Return the dataset, predicted where that is unfinished."""
+        store = runner.result(self.pushes)
+        total = store.info.pushes * len(store.info.assumed_engines)
+        with runner.bar(f"Predicting {self.name}", total) as bar:
+            return add_bystander(store, runner.folder(self), on_pushes=bar.add)
 
 
 def chunk_of(pushes: int) -> int:
@@ -121,7 +143,7 @@ class PaperSetup:
         By the recipe of fine-tuning any network, but for the steps, which are those of
         the network's own training.
         """
-        pushes = steps.WithBystander(self.training_pushes())
+        pushes = WithBystander(self.training_pushes())
         recipe = FINE_TUNING.changed(steps=PAPER.horizon.steps)
         recipe = scaled(recipe, self.scale, self.sizes.pushes)
         return tuple(

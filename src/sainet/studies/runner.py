@@ -1,6 +1,6 @@
 """Runs the steps of studies in order, each once, and reports their progress."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -12,11 +12,36 @@ from typing import Any, TypeVar, cast
 from sainet.learning.log import read_log
 from sainet.runs.workers import worker_lost
 from sainet.studies.durations import Clock
-from sainet.studies.steps import Place, Step, Train, all_steps
+from sainet.studies.steps import Place, Step, Train
 
 MANY = 1_000_000  # steps at once: all that can run
 _LOOK_AGAIN = 1.0  # s
 T = TypeVar("T")
+
+
+def all_steps(
+    lasts: Iterable[Step[Any]], *, known: Container[str] = ()
+) -> dict[str, Step[Any]]:
+    """Return steps and all that they need, by their keys: inputs first.
+
+    The order depends only on the steps, so that all shards count them alike.
+
+    Args:
+        lasts: steps.
+        known: keys of steps that are left out, with what only they need.
+    """
+    found: dict[str, Step[Any]] = {}
+    for step in lasts:
+        _add(step, found, known)
+    return found
+
+
+def _add(step: Step[Any], found: dict[str, Step[Any]], known: Container[str]) -> None:
+    if step.key in found or step.key in known:
+        return
+    for each in step.inputs:
+        _add(each, found, known)
+    found[step.key] = step
 
 
 @dataclass(frozen=True)

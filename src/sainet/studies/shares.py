@@ -13,8 +13,8 @@ from typing import Any
 from sainet.datasets.schema import ARRAYS
 from sainet.runs.shards import Shard, Share, collect, files_in, open_share
 from sainet.studies.durations import Clock
-from sainet.studies.runner import Runner
-from sainet.studies.steps import Step, all_steps
+from sainet.studies.runner import Runner, all_steps
+from sainet.studies.steps import Step
 
 
 class Several(Step[None]):

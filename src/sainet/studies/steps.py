@@ -1,15 +1,14 @@
 """Steps of studies: frozen settings and inputs, whose hash names the run folder."""
 
 import abc
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from enum import Enum
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar, dataclass_transform
 
 from msgspec import structs
 
-from sainet.datasets.bystander import add_bystander
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
 from sainet.datasets.schema import Arrays
@@ -19,7 +18,7 @@ from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join, pool_trainings
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.identification.identify import identify_into
-from sainet.learning.fit import FitResult, fit
+from sainet.learning.fit import fit
 from sainet.learning.log import loss_note
 from sainet.learning.recipes import FromModel, Recipe
 from sainet.models.identity import ModelId
@@ -94,31 +93,6 @@ class Step(abc.ABC, Generic[T]):
         return "-".join([*words.split(), self.key])
 
 
-def all_steps(
-    lasts: Iterable[Step[Any]], *, known: Container[str] = ()
-) -> dict[str, Step[Any]]:
-    """Return steps and all that they need, by their keys: inputs first.
-
-    The order depends only on the steps, so that all shards count them alike.
-
-    Args:
-        lasts: steps.
-        known: keys of steps that are left out, with what only they need.
-    """
-    found: dict[str, Step[Any]] = {}
-    for step in lasts:
-        _add(step, found, known)
-    return found
-
-
-def _add(step: Step[Any], found: dict[str, Step[Any]], known: Container[str]) -> None:
-    if step.key in found or step.key in known:
-        return
-    for each in step.inputs:
-        _add(each, found, known)
-    found[step.key] = step
-
-
 class Apart(Step[T]):
     """A step that runs in one other process, if there are some."""
 
@@ -162,13 +136,9 @@ class Simulate(Step[Store]):
 
     def run(self, runner: "Runner") -> Store:
         """Return the dataset, simulated where that is unfinished."""
+        folder, executor = runner.folder(self), runner.executor
         with runner.bar(f"Simulating {self.name}", self.config.pushes) as bar:
-            return generate(
-                self.config,
-                runner.folder(self),
-                executor=runner.executor,
-                on_pushes=bar.add,
-            )
+            return generate(self.config, folder, executor=executor, on_pushes=bar.add)
 
 
 class First(Step[Store]):
@@ -209,26 +179,6 @@ class Derive(Apart[Store]):
         """Return the dataset, made where that is unfinished."""
         store, folder = runner.result(self.pushes), runner.folder(self)
         return derive(store, folder, {"step": self.key}, self.change)
-
-
-class WithBystander(Apart[Store]):
-    """The same pushes, beside each a disk that nothing touches."""
-
-    is_kept = True
-
-    pushes: Step[Store]
-
-    @property
-    def name(self) -> str:
-        """The pushes and the bystander."""
-        return f"{self.pushes.name}-bystander"
-
-    def run(self, runner: "Runner") -> Store:
-        """Return the dataset, predicted where that is unfinished."""
-        store = runner.result(self.pushes)
-        total = store.info.pushes * len(store.info.assumed_engines)
-        with runner.bar(f"Predicting {self.name}", total) as bar:
-            return add_bystander(store, runner.folder(self), on_pushes=bar.add)
 
 
 class Load(Step[Model]):
@@ -283,29 +233,25 @@ class Train(Apart[Model]):
         """Return the training pushes."""
         return runner.result(self.pushes)
 
-    def fitting(self, runner: "Runner") -> "partial[FitResult]":
-        """Return the call that trains the network."""
-        recipe = self.recipe
-        if self.start is not None:
-            start = FromModel(str(runner.folder(self.start)))
-            recipe = recipe.changed(start=start)
-        engine = self.id.simulator.slug if self.id.simulator else "planar"
-        if self.identified is not None:
-            engine = str(runner.folder(self.identified))
-        return partial(
-            fit,
-            "in" if self.id.kind == "in" else "sain",
-            self.stores(runner),
-            recipe,
-            runner.folder(self),
-            assumed_engine=engine,
-        )
+    def recipe_in(self, runner: "Runner") -> Recipe:
+        """Return the recipe; a network to start from is in its run folder."""
+        if self.start is None:
+            return self.recipe
+        return self.recipe.changed(start=FromModel(str(runner.folder(self.start))))
 
     def run(self, runner: "Runner") -> Model:
         """Return the network, trained where that is unfinished."""
+        engine = self.id.simulator.slug if self.id.simulator else "planar"
+        if self.identified is not None:
+            engine = str(runner.folder(self.identified))
         with runner.bar(f"Training {self.name}", self.iterations) as bar:
-            result = self.fitting(runner)(
-                on_step=lambda done, loss: bar.reach(done, loss_note(loss))
+            result = fit(
+                "in" if self.id.kind == "in" else "sain",
+                self.stores(runner),
+                self.recipe_in(runner),
+                runner.folder(self),
+                assumed_engine=engine,
+                on_step=lambda done, loss: bar.reach(done, loss_note(loss)),
             )
             bar.reach(self.iterations, loss_note(result.loss))
         return replace(load_model(str(runner.folder(self))), id=self.id)
