@@ -98,7 +98,7 @@ def test_without_arguments_the_help_is_printed():
         (("generate", "robot", "--workers", "0"), ("--workers", "at least 1")),
         (("generate", "robot", "--disks", "1000000"), ("--disks", "from 1 to 100")),
         (("generate", "robot", "--engine", "planer"), ("--engine", "mean planar?")),
-        (("reproduce", "--trainers", "0"), ("--trainers", "at least 1")),
+        (("reproduce", "--at-once", "0"), ("--at-once", "at least 1")),
     ],
 )
 def test_bad_settings_are_named_without_output(tmp_path, words, names):

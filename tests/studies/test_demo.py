@@ -146,8 +146,8 @@ def test_every_claim_is_a_sentence_that_a_summary_can_test():
 
 def test_parallel_training_is_refused_on_one_gpu(begun, monkeypatch):
     monkeypatch.setattr("jax.default_backend", lambda: "gpu")
-    with pytest.raises(BadInput, match="--trainers is 2; on a GPU it must be 1"):
-        Reproduce(studies=("robot-planar",), trainers=2).run()
+    with pytest.raises(BadInput, match="--at-once is 2; on a GPU it must be 1"):
+        Reproduce(studies=("robot-planar",), at_once=2).run()
     assert begun == []
     Reproduce(studies=("robot-planar",)).run()
     assert [folder.name for folder in begun] == ["robot-planar-quick"]

@@ -66,7 +66,7 @@ def chunk_of(pushes: int) -> int:
 
     Datasets share compiled programs if their chunks are equal.
     """
-    return 250 if pushes >= _MANY else 20
+    return 250 if pushes >= _MANY else min(20, pushes)
 
 
 @dataclass(frozen=True)
