@@ -61,7 +61,7 @@ def test_durations_are_summed_by_the_kind_of_work(out, monkeypatch):
     steps = [Load(ModelId(kind=name), name) for name in ("in", "sain")]
     monkeypatch.setattr("sainet.studies.durations._SHORTEST", -1.0)
     for step in steps:
-        with clock.time([step], are_done=True):
+        with clock.time(step):
             pass
     *_, durations = report(out, steps=steps).plain_tables
     assert [row[:2] for row in durations.rows] == [("Load", "2")]
