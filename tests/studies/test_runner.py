@@ -208,6 +208,16 @@ def test_a_failed_step_is_reported_and_the_others_are_given_up(tmp_path):
         Runner(tmp_path, executor, at_once=2).result(last)
 
 
+def test_the_error_of_a_step_ahead_is_raised_when_it_is_needed(tmp_path):
+    first, second = Names((Note("a"), Who("b"))), Names((Fails(), Who("c")))
+    with Listed() as executor:
+        runner = Runner(tmp_path, executor, at_once=3, ahead=[first, second])
+        assert len(runner.result(first)) == 2
+        assert "fails" in executor.order
+        with pytest.raises(SainetError, match="does not work"):
+            runner.result(second)
+
+
 def test_every_step_runs_once_after_its_inputs(tmp_path):
     log = []
     first = Sum("first", log)

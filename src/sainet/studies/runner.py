@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from sainet.learning.log import read_log
+from sainet.runs.errors import SainetError
 from sainet.runs.workers import worker_lost
 from sainet.studies.durations import Clock
 from sainet.studies.steps import Place, Step, Train
@@ -96,6 +97,7 @@ class Runner:
     ahead: Sequence[Step[Any]] = ()  # of which results will be asked for, in this order
     clock: Clock = field(default_factory=Clock)
     _results: dict[str, object] = field(default_factory=dict)
+    _errors: dict[str, SainetError] = field(default_factory=dict)
     _running: dict[Future[Any], Step[Any]] = field(default_factory=dict)
 
     def folder(self, step: Step[Any]) -> Path:
@@ -153,9 +155,10 @@ class Runner:
         return [s for s in steps if s.place is Place.SPREAD and self._can_run(s)]
 
     def _can_run(self, step: Step[Any]) -> bool:
-        """Return whether a step has no result yet, but all its inputs have."""
-        known = self._results
-        return step.key not in known and all(each.key in known for each in step.inputs)
+        """Return whether a step has not ended yet, but all its inputs have."""
+        if step.key in self._results or step.key in self._errors:
+            return False
+        return all(each.key in self._results for each in step.inputs)
 
     def _start(self, steps: Sequence[Step[Any]], executor: Executor) -> None:
         """Give steps to the executor, as many as it takes; run light ones here."""
@@ -179,23 +182,26 @@ class Runner:
                 for future in done:
                     self._take(future)
                 start()
+                for step in left:
+                    if step.key in self._errors:  # those of steps ahead may wait
+                        raise self._errors[step.key]
                 ended = sum(step.key in self._results for step in left)
-                bar.reach(ended, self._note())
+                running = map(self._progress, self._running.values())
+                bar.reach(ended, ", ".join(running))
 
     def _take(self, future: Future[Any]) -> None:
         """Take the result of a step from the executor, or from its run folder."""
-        result = future.result()
-        step = self._running.pop(future)
-        self.clock.end(step)
-        if step.is_kept:  # and finished, which needs no bar
-            result = Runner(self.out, _results=self._results).result(step)
-        self._results[step.key] = result
-
-    def _note(self) -> str:
-        """Return what is running, and how far networks are."""
-        return ", ".join(map(self._progress, self._running.values()))
+        step, error = self._running.pop(future), future.exception()
+        self.clock.end(step, is_done=error is None)
+        if isinstance(error, SainetError):
+            self._errors[step.key] = error
+        elif error is None and step.is_kept:  # and finished, which needs no bar
+            Runner(self.out, _results=self._results).result(step)
+        else:
+            self._results[step.key] = future.result()
 
     def _progress(self, step: Step[Any]) -> str:
+        """Return the name of a step that is running, and how far a network is."""
         lines = read_log(self.folder(step)) if isinstance(step, Train) else ()
         return f"{step.name} at {lines[-1].iteration:,}" if lines else step.name
 
