@@ -204,6 +204,7 @@ WAY_IN = (
         "report/pictures",
     ),
     *("report/pictures", "report/figures/overview", "models/push_inputs"),
+    "bench/environments",
     # With lines that stood in models/library.py and cli/output.py before.
     *("models/model.py", "runs/progress.py"),
 )
@@ -246,6 +247,8 @@ ANY_NUMBER = (
     "models/correctors/held",
     "learning/mixture",
     "studies/any_number",
+    "studies/control_any_number",
+    "tasks/obstacles",
 )
 # The whole paper with one command: letter, feedforward networks, claims.
 WHOLE_PAPER = (
@@ -265,7 +268,13 @@ WHOLE_PAPER = (
     "studies/reduced_setup",
     "studies/whole_report",
 )
-MANY_MACHINES = ("evaluation/parts", "runs/executors", "runs/shards", "studies/shares")
+MANY_MACHINES = (
+    "evaluation/parts",
+    "runs/executors",
+    "runs/programs",
+    "runs/shards",
+    "studies/shares",
+)
 ENGINEER = (
     "cli/inspect",
     "datasets/doubts",
@@ -308,6 +317,8 @@ CONNECTIONS = {
     "ensembles": 62,
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
+    "obstacles and other target disks": 25,
+    "episodes of several models side by side": 45,
     # Also durations, the report of all studies, and fewer training runs.
     "the whole paper": 250,
     # Shares of datasets, trials and evaluations, the options of five commands, and
@@ -335,8 +346,8 @@ COUNTS = {
                 set(modules_of(WAY_IN)) - set(modules_of(MJCF + VALIDATION)),
             )
         ),
-        3_500,
-        3_500,
+        3_540,
+        3_540,
     ),
     "code lines of engines from MJCF": (
         lambda: sum(map(code_lines, modules_of(MJCF))),
@@ -370,18 +381,18 @@ COUNTS = {
     ),
     "code lines of any number of disks": (
         lambda: sum(map(code_lines, modules_of(ANY_NUMBER))),
-        500,
-        500,
+        600,
+        600,
     ),
     "code lines of the whole paper": (
         lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
-        1_200,
-        1_200,
+        1_215,
+        1_215,
     ),
     "code lines of many machines": (
         lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),
-        470,
-        470,
+        480,
+        480,
     ),
     "code lines of the engineer's path": (
         lambda: sum(map(code_lines, modules_of(ENGINEER))),

@@ -33,7 +33,7 @@ class Reproduce:
     (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
     regularisation and robustness, with the networks of Table III; published-physics,
     letter, letter-noise and letter-weak-damper; feedforward, varied-or-fixed and
-    crossed-properties, at reduced size; simulated-control and
+    crossed-properties, at reduced size; simulated-control, control-any-number and
     adaptation, with shipped networks; any-number and gaps; expected-cost; robot-planar;
     engine-parity; pretrained (the shipped networks); fine-tuning (settings chosen on
     simulated pushes); recorded-pushes, recorded-trust, recorded-few, recorded-active,

@@ -21,6 +21,7 @@ _COUNTS = {
     "pushes": (1, 1_000_000),
     "seed": (0, LARGEST_COUNT),
 }
+_LEAST_ROW = 2  # disks
 _LEAST_TOLERANCE = 1e-6  # of a radius
 _MOST_WRONG = 0.5  # fraction of masses and radii
 
@@ -35,6 +36,12 @@ class ControlConfig(RobotConfig):
     goals: Goals = "easy"
     """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
     either side)."""
+    moved: int | None = None
+    """Number of the target disk in the row. Default: the last one; the disks behind
+    another one are in its way."""
+    obstacles: int = 0
+    """How many of the disks, the last ones, lie beside the way of the target disk
+    instead of in the row, at random (simulated)."""
     planner: str = "greedy"
     """Planner: greedy (the paper's search) or tree (every sequence of two pushes)."""
     trials: int = 25
@@ -74,6 +81,10 @@ class ControlConfig(RobotConfig):
         for name, (low, high) in _COUNTS.items():
             require_count(name, getattr(self, name), low=low, high=high)
         require_one_of("goals", self.goals, get_args(Goals))
+        most = self.disks - _LEAST_ROW
+        require_count("obstacles", self.obstacles, low=0, high=most)
+        if self.moved is not None:
+            require_count("moved", self.moved, high=self.disks - self.obstacles)
         require_one_of(
             "given_properties", self.given_properties, get_args(GivenProperties)
         )
@@ -88,6 +99,11 @@ class ControlConfig(RobotConfig):
         require(0 < stop <= 1, "stopping_tolerance", "above 0, at most 1", stop)
         late = self.deadline is None or 0 < self.deadline < math.inf
         require(late, "deadline", "positive and finite", self.deadline)
+
+    @property
+    def target(self) -> int:
+        """The index of the target disk."""
+        return (self.moved or self.disks - self.obstacles) - 1
 
 
 _GAP_MM = (0.01, 100.0)

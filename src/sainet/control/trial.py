@@ -5,6 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from sainet.control.config import ControlConfig
 from sainet.engines.simulator import PAPER
@@ -13,6 +14,8 @@ from sainet.robots.base import AbstractRobot
 from sainet.robots.simulated import scene_of
 from sainet.scenes.pushes import push_axis
 from sainet.scenes.scene import Scene
+from sainet.scenes.state import State
+from sainet.tasks.obstacles import Way, draw_obstacles
 from sainet.tasks.push_to_goal import PushToGoal, draw_goal
 from sainet.worlds.sampling import scattered
 
@@ -41,9 +44,12 @@ def make_trial(config: ControlConfig, index: int) -> Trial:
 
 
 def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
-    """Return the trial of a robot, with the goal drawn from where its disks are."""
+    """Return the trial of a robot, with the goal drawn from where its disks are.
+
+    Obstacles are put beside the way to it.
+    """
     true, state = robot.scene, robot.truth
-    moved = config.disks - 1
+    moved = config.target
     goal = draw_goal(
         config.goals,
         config.seed,
@@ -52,6 +58,13 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
         axis=float(push_axis(state)),
         radius=float(true.radius[moved]),
     )
+    if config.obstacles:
+        row = np.asarray(state.position)[: -config.obstacles]
+        radii = np.asarray(true.radius, np.float64)
+        way = Way(row[moved], goal, float(radii[moved]))
+        others = draw_obstacles(config.seed, index, way, row, radii)
+        robot.arrange(_with_last(state, others))
+        robot.observe()
     task = PushToGoal(
         jnp.asarray(goal, jnp.float32), moved, config.tolerance, config.alignment
     )
@@ -60,6 +73,12 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
         assert PAPER.mass and PAPER.radius  # both are assumed
         given = scene_of(PAPER.mass, PAPER.radius, config.disks, _FRICTION)
     return Trial(robot, task, wrong_by(given, config, index))
+
+
+def _with_last(state: State, position: Float[np.ndarray, "disk 2"]) -> State:
+    """Return a state whose last disks are elsewhere."""
+    moved = state.position.at[-len(position) :].set(position)
+    return eqx.tree_at(lambda s: s.position, state, moved)
 
 
 def wrong_by(scene: Scene, config: ControlConfig, index: int) -> Scene:

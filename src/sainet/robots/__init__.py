@@ -34,7 +34,7 @@ class RobotConfig:
     world: str = "planar"
     """Engine of the simulated world: planar, or bullet as in the paper."""
     disks: int = 2
-    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
+    """Number of disks on the table; disk 1 is pushed. They touch in a row."""
     noise_level: NoiseLevel = "default"
     """Scale of the world's noise; paper-like is three times the default."""
     lab: int = 0

@@ -34,6 +34,7 @@ STUDIES = {
     "crossed-properties": "sainet.studies.properties:CROSSED",
     "robustness": "sainet.studies.robustness:STUDY",
     "simulated-control": "sainet.studies.simulated_control:STUDY",
+    "control-any-number": "sainet.studies.control_any_number:STUDY",
     "adaptation": "sainet.studies.adaptation:STUDY",
     "expected-cost": "sainet.studies.expected_cost:STUDY",
     "engine-parity": "sainet.studies.engine_parity:STUDY",
