@@ -67,10 +67,6 @@ checks.install()
 install_import_hook("sainet", "support.typechecker")
 
 
-MAPS = Path("/proc/self/maps")
-MOST_MAPS = 20_000
-
-
 class Chromium(NamedTuple):
     """Where Chromium and its driver are."""
 
@@ -99,12 +95,10 @@ def pytest_runtest_setup() -> None:
 def few_compiled_programs() -> Iterator[None]:
     """Forget compiled programs before the system has no room for their memory maps.
 
-    Linux allows a process 65,530 of them; XLA ends with a segmentation fault there.
+    The tests of a module share them.
     """
     yield
-    if len(MAPS.read_bytes().splitlines()) > MOST_MAPS:
-        jax.clear_caches()
-        gc.collect()
+    import_module("sainet.runs.programs").make_room()
 
 
 @pytest.fixture(scope="session")

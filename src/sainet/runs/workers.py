@@ -15,6 +15,7 @@ from typing import Any, final
 
 from sainet.runs.errors import BadSetting, SainetError
 from sainet.runs.interrupts import remember_interrupt
+from sainet.runs.programs import make_room
 
 # Signal that a failure sends to the workers of its pool. Workers of background jobs
 # ignore SIGINT, which a shell sends to foreground jobs.
@@ -163,6 +164,7 @@ def _do(work: Callable[..., Any], *arguments: Any, **named: Any) -> Any:  # noqa
             raise KeyboardInterrupt
         return work(*arguments, **named)
     finally:
+        make_room()
         _worker.is_busy = False
 
 

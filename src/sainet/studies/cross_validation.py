@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
-import jax
 from msgspec import structs
 
 from sainet.datasets import Scheme
@@ -172,7 +171,6 @@ class FitCandidate(Apart[Model]):
         folder, pushes = runner.folder(self), self.engine.pushes.store
         identified = read_identified(runner.folder(self.engine))
         self.candidate.fit(pushes, identified.engine, folder)
-        jax.clear_caches()  # of programs for so many pushes; hundreds crash XLA
         return replace(load_model(str(folder)), id=self.candidate.identity)
 
 
@@ -199,7 +197,6 @@ class EvaluateFitted(Apart[Measurements]):
             found = evaluate((load_model("physics"), *models), self.pushes.store)
             path.parent.mkdir(parents=True, exist_ok=True)
             found.write(path)
-            jax.clear_caches()  # each fold compiles programs of its own
         return read_measurements(path).in_condition(self.condition)
 
 

@@ -5,7 +5,6 @@ identified on the first few pushes, drawn at random; then pushes of the pool are
 those that `choose_pushes` names or others at random, and the process is fitted again.
 """
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
@@ -60,7 +59,6 @@ class Draw(Apart[Measurements]):
         if not path.is_file():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._measure().write(path)
-            jax.clear_caches()
         return read_measurements(path)
 
     def _measure(self) -> Measurements:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar, cast
 
 from sainet.learning.log import read_log
 from sainet.runs.errors import SainetError
+from sainet.runs.programs import make_room
 from sainet.runs.workers import worker_lost
 from sainet.studies.durations import Clock
 from sainet.studies.steps import Place, Step, Train
@@ -138,6 +139,7 @@ class Runner:
     def _run_here(self, step: Step[Any]) -> None:
         with self.clock.time(step):
             self._results[step.key] = step.run(self)
+        make_room()
 
     def _run_at_once(self, last: Step[Any], executor: Executor) -> None:
         """Run a step after all that it needs, and steps ahead beside them."""
