@@ -162,6 +162,17 @@ def test_planning_reports_the_documented_figures(monkeypatch):
 
 
 @pytest.mark.slow
+def test_environments_reports_the_documented_figures():
+    figures = load_case("environments")(1, worlds=3)
+    wanted = ("vector_pushes_per_s", "bullet_pushes_per_s", "bullet_ratio")
+    assert tuple(figures) == (*wanted, "worlds", "processes", "runs", "reason")
+    is_measured = bool(find_spec("gymnasium") and find_spec("pybullet"))
+    assert all_finite(figures, but=("reason",) if is_measured else (*wanted, "reason"))
+    assert (figures["reason"] is None) == is_measured
+    json.dumps(figures, allow_nan=False)
+
+
+@pytest.mark.slow
 def test_training_reports_the_documented_figures():
     figures = load_case("training")(2, pushes=3, steps=4, repeats=1)
     assert set(figures) == {
@@ -209,7 +220,8 @@ def test_the_ceiling_is_a_plausible_rate():
 
 
 def test_an_unknown_case_lists_the_available_cases():
-    with pytest.raises(UnknownName, match="'trainin'.*engines, planning, training"):
+    every = "engines, environments, planning, training"
+    with pytest.raises(UnknownName, match=f"'trainin'.*{every}"):
         load_case("trainin")
 
 
