@@ -1,12 +1,15 @@
 """Evidence: what `results/` keeps of studies, identifications and benchmarks."""
 
+from collections import defaultdict
 from pathlib import Path
 
 import msgspec
 
+from sainet.control.record import FOLDER, EpisodeRecord, read_record
 from sainet.evaluation.measurements import Measurements, read_measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import IDENTIFIED, Identified, read_identified
+from sainet.models.library import MODELS
 from sainet.runs import documents
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
@@ -16,6 +19,7 @@ from sainet.studies.study import AS_TRAINED, ENGINE_ERRORS, MEASUREMENTS
 
 RESULTS, FIGURES = "results", "docs/figures"
 _IDENTIFIED = "identified"  # folder of documents
+_EPISODES = "episodes"  # folder of folders, each of one goal
 
 
 class Benchmark(msgspec.Struct, frozen=True):
@@ -74,6 +78,16 @@ class Evidence:
             path.stem: documents.read_document(path, Identification) for path in paths
         }
 
+    def episodes(self) -> dict[str, list[EpisodeRecord]]:
+        """Return the kept episodes of each goal, in the order of `MODELS`."""
+        found: dict[str, list[EpisodeRecord]] = defaultdict(list)
+        for path in sorted((self.folder / _EPISODES).glob("*/*.json")):
+            record = documents.read_document(path, EpisodeRecord)
+            found[path.parent.name].append(record)
+        for records in found.values():
+            records.sort(key=lambda each: MODELS.index(each.model))
+        return dict(found)
+
 
 def described(machine: Manifest) -> str:
     """Return processor, cores and versions in words."""
@@ -85,14 +99,23 @@ def keep(path: Path, root: Path) -> None:
     """Keep evidence in ``results/``: measurements at published precision.
 
     Args:
-        path: the folder of a study or of an identification, or the JSON of `sainet
-            bench`, made on this machine.
+        path: the folder of a study or of an identification, the JSON of `sainet
+            bench`, made on this machine, or the record of an episode with a model of
+            `MODELS`.
         root: the repository.
 
     Raises:
         BadInput: there is nothing to keep.
     """
     results = root / RESULTS
+    if path.is_file() and path.parent.name == FOLDER:
+        record = read_record(path)
+        if record.model not in MODELS:
+            raise BadInput(f"{path}: model is {record.model}, not one of {MODELS}.")
+        goal = f"{record.goals}-{len(record.radius_mm)}-disks"
+        file = results / _EPISODES / goal / f"{record.model}.json"
+        documents.write_document(file, record)
+        return
     if path.is_file():
         for case, figures in _cases(path).items():
             documents.write_document(results / f"bench-{case}.json", figures)

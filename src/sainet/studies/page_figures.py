@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from sainet.report.figures.episodes import draw_side_by_side
 from sainet.report.figures.overview import Part, draw_errors_over_physics, draw_success
 from sainet.report.pictures import draw_pictures
 from sainet.studies import STUDIES, load_study
@@ -41,4 +42,6 @@ def draw_figures(evidence: Evidence, figures: Path) -> None:
         study = load_study(name)
         if study.figure is not None:
             study.figure(evidence.summary(name), figures / study.figure_name)
+    for goal, records in evidence.episodes().items():
+        draw_side_by_side(records, figures / f"episodes-{goal}.svg")
     draw_pictures(figures)

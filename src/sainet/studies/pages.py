@@ -3,9 +3,9 @@
     python -m sainet.studies.pages [PATH ...]
 
 First the evidence in each PATH is put into ``results/``: the folder of a study that
-`sainet reproduce` ran or of `sainet identify`, or a file with the JSON of `sainet
-bench`. Prose stands in the templates in ``docs/templates``, which set their titles;
-numbers come from measurements.
+`sainet reproduce` ran or of `sainet identify`, a file with the JSON of `sainet bench`,
+or the record of an episode that is drawn. Prose stands in the templates in
+``docs/templates``, which set their titles; numbers come from measurements.
 """
 
 import sys

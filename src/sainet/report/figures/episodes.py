@@ -2,7 +2,7 @@
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 from sainet.control.record import EpisodeRecord
 from sainet.report.episode_frames import outcome
 from sainet.report.figures.canvas import house_look, new_figure, save
-from sainet.report.palette import INK, MOVED, OTHER, PUSHED, TARGET
+from sainet.report.palette import INK, MOVED, OTHER, PUSHED, TARGET, style_of
 
 _ACROSS = 3  # panels
 _TITLE_WIDTH = 26  # characters; a longer title would leave the figure
@@ -22,7 +22,11 @@ _MARGIN = 10  # mm around the drawing
 Place = Sequence[float] | np.ndarray  # mm
 
 
-def draw_episodes(records: Sequence[EpisodeRecord], path: Path) -> Path:
+def draw_episodes(
+    records: Sequence[EpisodeRecord],
+    path: Path,
+    titled: Callable[[EpisodeRecord], str] = outcome,
+) -> Path:
     """Draw one panel per episode: initial disks transparent, final disks solid.
 
     The target region is the tolerance around the goal; a white cross marks the final
@@ -31,6 +35,7 @@ def draw_episodes(records: Sequence[EpisodeRecord], path: Path) -> Path:
     Args:
         records: records from the run folder of `sainet control`.
         path: where to write; ``.svg`` or ``.png``.
+        titled: returns the title of a panel.
     """
     across = min(_ACROSS, len(records))
     down = math.ceil(len(records) / across)
@@ -40,11 +45,18 @@ def draw_episodes(records: Sequence[EpisodeRecord], path: Path) -> Path:
         # All panels share one scale, so that episodes can be compared.
         low, high = _extent(records)
         for axes, record in zip(panels, records, strict=False):
-            draw_episode(axes, record)
+            draw_episode(axes, record, titled(record))
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         for axes in panels[len(records) :]:
             axes.set_axis_off()
         return save(figure, path)
+
+
+def draw_side_by_side(records: Sequence[EpisodeRecord], path: Path) -> Path:
+    """Draw episodes of several models with one goal, under the names of the models."""
+    return draw_episodes(
+        records, path, lambda each: f"{style_of(each.model).label}: {outcome(each)}"
+    )
 
 
 def _extent(records: Sequence[EpisodeRecord]) -> tuple[np.ndarray, np.ndarray]:
@@ -57,8 +69,8 @@ def _extent(records: Sequence[EpisodeRecord]) -> tuple[np.ndarray, np.ndarray]:
     return np.nanmin(every, axis=0) - reach, np.nanmax(every, axis=0) + reach
 
 
-def draw_episode(axes: Axes, record: EpisodeRecord) -> None:
-    """Draw one episode (mm)."""
+def draw_episode(axes: Axes, record: EpisodeRecord, title: str) -> None:
+    """Draw one episode (mm) under a title and how far from the goal it ended."""
     path = body_paths(record)
     for body, radius in enumerate(record.radius_mm):
         color = body_color(record, body)
@@ -69,7 +81,7 @@ def draw_episode(axes: Axes, record: EpisodeRecord) -> None:
     _disk(axes, record.goal_mm, record.tolerance_mm, facecolor=TARGET, zorder=4)
     end = path[-1, record.moved, :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
-    title = textwrap.fill(outcome(record), _TITLE_WIDTH)
+    title = textwrap.fill(title, _TITLE_WIDTH)
     off = record.final_mm
     axes.set_title(title if off is None else f"{title}\n{off:.1f} mm off")
     axes.set_aspect("equal")
