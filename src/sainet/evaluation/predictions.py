@@ -17,7 +17,9 @@ from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.model import Model
 
 OnPushes = Callable[[str, int], None]  # called with a model and its new predictions
-_BATCH = 256  # pushes that are predicted at a time: one compilation for each length
+# Pushes that are predicted at a time: one compilation for each length and size. Few are
+# filled up, so that datasets of about one size share what is compiled.
+_BATCH, _FEW = 256, 16
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def predict_all(
         found: list[np.ndarray] = []
         for start in range(0, len(part), _BATCH):
             rows = part[start : start + _BATCH]
-            whole = np.resize(rows, min(_BATCH, len(part)))
+            whole = np.resize(rows, min(_BATCH, -(-len(part) // _FEW) * _FEW))
             some = {name: array[whole] for name, array in arrays.items()}
             batch = to_batch(some, store.info, steps=steps, simulated=stored)
             pose = _predict(model.dynamics, batch)

@@ -20,7 +20,7 @@ from sainet.learning.recipes import CONTACT, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.studies import Scale
-from sainet.studies.paper_setup import IN, SAIN, chunk_of, physics
+from sainet.studies.paper_setup import IN, SAIN, chunk_of, in_batches, physics
 from sainet.studies.steps import Evaluate, Join, Load, Simulate, Step, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import Arrangement
@@ -97,9 +97,9 @@ def of_one_to_four(scope: Scope) -> tuple[TrainMixture, ...]:
 
 def _recipes(scope: Scope) -> Iterator[Recipe]:
     iterations = SIZES[scope.scale][2] or CONTACT.optimiser.iterations
-    batch = min(CONTACT.optimiser.batch_size, SIZES[scope.scale][0])
+    recipe = in_batches(CONTACT, scope.scale, SIZES[scope.scale][0])
     for seed in scope.seeds(TRAININGS):
-        yield CONTACT.changed(iterations=iterations, seed=seed, batch_size=batch)
+        yield recipe.changed(iterations=iterations, seed=seed)
 
 
 def _paper() -> tuple[Step[Model], ...]:

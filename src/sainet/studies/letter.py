@@ -17,7 +17,16 @@ from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER, Recipe
 from sainet.models.identity import Features, ModelId, Variant
-from sainet.studies.paper_setup import IN, SAIN_BULLET, SIZES, Sizes, chunk_of, physics
+from sainet.studies import Scale
+from sainet.studies.paper_setup import (
+    IN,
+    SAIN_BULLET,
+    SIZES,
+    Sizes,
+    chunk_of,
+    in_batches,
+    physics,
+)
 from sainet.studies.paper_tables import PUBLISHED_DIRECT_FORCE_TWO_DISKS
 from sainet.studies.steps import Evaluate, Join, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
@@ -69,6 +78,7 @@ class World:
     """Pushes by a force in one world, and how many are simulated and trained on."""
 
     label: str
+    scale: Scale
     sizes: Sizes
     config: GenerateConfig = GenerateConfig()
     steps: int = PAPER.horizon.steps  # of each push, that are trained on and count
@@ -92,10 +102,10 @@ class World:
         return Evaluate(models, tests, condition, self.steps)
 
     def _recipe(self, stage: Stage) -> Recipe:
-        return stage.recipe.changed(
+        recipe = in_batches(stage.recipe, self.scale, self.sizes.pushes)
+        return recipe.changed(
             iterations=self.sizes.iterations,
             halve_every=max(self.sizes.iterations // 4, 1),
-            batch_size=min(stage.recipe.optimiser.batch_size, self.sizes.pushes),
             steps=self.steps,
         )
 
@@ -121,7 +131,7 @@ WEAK_DAMPER = GenerateConfig(damping_n_s_m=100.0, force_n=3.5, gap_mm=-2.0)
 
 def _chain(scope: Scope) -> Plan:
     """Return the errors of each stage, at reduced size and the default noise."""
-    world = World("letter", REDUCED[scope.scale])
+    world = World("letter", scope.scale, REDUCED[scope.scale])
     return Plan(world.compare((*CHAIN, LESS_L2), scope.seeds(TRAININGS)))
 
 
@@ -130,7 +140,7 @@ def _noise(scope: Scope) -> Plan:
     parts, sizes = [], SIZES if scope.scale == "paper" else REDUCED
     for level in get_args(NoiseLevel):
         config = GenerateConfig(noise_level=level)
-        world = World(f"letter-{level}", sizes[scope.scale], config)
+        world = World(f"letter-{level}", scope.scale, sizes[scope.scale], config)
         named = Condition(label=f"{level} noise", factors={"noise_level": level})
         parts.append(world.compare((LETTER, USUAL), range(1), named))
     return Plan(Join(tuple(parts)))
@@ -138,7 +148,9 @@ def _noise(scope: Scope) -> Plan:
 
 def _weak_damper(scope: Scope) -> Plan:
     """Return the errors of both ends where the friction decides, over all 2 s."""
-    world = World("weak-damper", REDUCED[scope.scale], WEAK_DAMPER, _ALL_STEPS)
+    world = World(
+        "weak-damper", scope.scale, REDUCED[scope.scale], WEAK_DAMPER, _ALL_STEPS
+    )
     return Plan(world.compare((LETTER, USUAL), scope.seeds(TRAININGS)))
 
 

@@ -25,7 +25,7 @@ SAIN_BULLET, SAIN, SAIN_TRUE = (
 NETWORKS = (IN, SAIN_BULLET, SAIN, SAIN_TRUE)
 _QUICK_ITERATIONS = 20
 _MANY = 500  # pushes
-_QUICK_BATCH = 40  # pushes
+_QUICK_BATCH = 10  # pushes: of one size, whatever the data, to share compiled code
 _TEST_SEED, _VALIDATION_SEED = 1, 2
 
 
@@ -84,9 +84,7 @@ class PaperSetup:
     @property
     def recipe(self) -> Recipe:
         """The paper's recipe, with the iterations of the scale."""
-        found = PAPER.changed(iterations=self.sizes.iterations)
-        is_quick = self.scale == "quick"
-        return found.changed(batch_size=_QUICK_BATCH) if is_quick else found
+        return PAPER.changed(iterations=self.sizes.iterations)
 
     def training_pushes(self) -> steps.Simulate:
         """Return the training pushes, with the predictions of every internal engine."""
@@ -127,10 +125,9 @@ class PaperSetup:
         chosen: steps.Step[Store] = data
         if pushes not in (None, count):
             count, chosen = pushes, steps.First(data, pushes)
-        recipe = recipe or self.recipe
-        batch = min(recipe.optimiser.batch_size, count)
+        recipe = in_batches(recipe or self.recipe, self.scale, count)
         return tuple(
-            steps.Train(network, chosen, recipe.changed(batch_size=batch, seed=seed))
+            steps.Train(network, chosen, recipe.changed(seed=seed))
             for network in networks
             for seed in seeds
         )
@@ -189,6 +186,12 @@ def physics(engine: str = "planar") -> tuple[steps.Load, ...]:
 
 def scaled(recipe: Recipe, scale: Scale, pushes: int) -> Recipe:
     """Return a recipe for so many pushes: the quick scale has a few iterations."""
-    recipe = recipe.changed(batch_size=min(recipe.optimiser.batch_size, pushes))
+    recipe = in_batches(recipe, scale, pushes)
     quick = recipe.changed(iterations=_QUICK_ITERATIONS)
     return quick if scale == "quick" else recipe
+
+
+def in_batches(recipe: Recipe, scale: Scale, pushes: int) -> Recipe:
+    """Return a recipe whose batches have no more pushes than there are."""
+    most = min(pushes, _QUICK_BATCH) if scale == "quick" else pushes
+    return recipe.changed(batch_size=min(recipe.optimiser.batch_size, most))

@@ -26,6 +26,7 @@ from sainet.studies.paper_setup import (
     SAIN_BULLET,
     PaperSetup,
     chunk_of,
+    in_batches,
     physics,
 )
 from sainet.studies.steps import Evaluate, Join, Simulate, Train
@@ -44,11 +45,12 @@ def _plan(scope: Scope) -> Plan:
     usual = paper.train((IN, SAIN, SAIN_BULLET), range(1))
     pushes, tests, iterations = SIZES[scope.scale]
     training = Simulate("long-train", _long_pushes(pushes, LONG_PUSHES.seed))
+    recipe = in_batches(RECIPE, scope.scale, pushes)
     long = tuple(
         Train(
             identity,
             training,
-            RECIPE.changed(start=FromModel(identity.kind), iterations=iterations),
+            recipe.changed(start=FromModel(identity.kind), iterations=iterations),
         )
         for identity in (IN_LONG, SAIN_LONG)
     )

@@ -11,7 +11,7 @@ from sainet.datasets.store import Store
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER
 from sainet.models.identity import ModelId
-from sainet.studies.paper_setup import Sizes, chunk_of, physics
+from sainet.studies.paper_setup import Sizes, chunk_of, in_batches, physics
 from sainet.studies.steps import Evaluate, Simulate, Step, Train
 from sainet.studies.study import Scope
 
@@ -56,10 +56,10 @@ class ReducedSetup:
             pushes: to train on; None: the paper's.
         """
         iterations = self.sizes.iterations
-        recipe = PAPER.changed(
-            iterations=iterations,
-            halve_every=iterations // _HALVINGS,
-            batch_size=min(PAPER.optimiser.batch_size, self.sizes.pushes),
+        recipe = in_batches(
+            PAPER.changed(iterations=iterations, halve_every=iterations // _HALVINGS),
+            self.scope.scale,
+            self.sizes.pushes,
         )
         return tuple(
             Train(
