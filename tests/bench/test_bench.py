@@ -162,6 +162,19 @@ def test_planning_reports_the_documented_figures(monkeypatch):
 
 
 @pytest.mark.slow
+def test_disks_reports_the_documented_figures():
+    figures = load_case("disks")(1, counts=(2, 3))
+    wanted = [
+        f"{name}_{count}"
+        for count in (2, 3)
+        for name in ("engine_step_us", "network_step_us", "tree_s")
+    ]
+    assert list(figures) == [*wanted, "devices", "runs"]
+    assert all_finite(figures)
+    json.dumps(figures, allow_nan=False)
+
+
+@pytest.mark.slow
 def test_environments_reports_the_documented_figures():
     figures = load_case("environments")(1, worlds=3)
     wanted = ("vector_pushes_per_s", "bullet_pushes_per_s", "bullet_ratio")
@@ -220,7 +233,7 @@ def test_the_ceiling_is_a_plausible_rate():
 
 
 def test_an_unknown_case_lists_the_available_cases():
-    every = "engines, environments, planning, training"
+    every = "disks, engines, environments, planning, training"
     with pytest.raises(UnknownName, match=f"'trainin'.*{every}"):
         load_case("trainin")
 

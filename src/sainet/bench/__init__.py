@@ -10,6 +10,7 @@ Figures = Mapping[str, float | str | None]  # by name; None where not measured
 
 # Functions that take `runs`.
 CASES = {
+    "disks": "sainet.bench.disks:bench_disks",
     "engines": "sainet.bench.engines:bench_engines",
     "environments": "sainet.bench.environments:bench_environments",
     "planning": "sainet.bench.planning:bench_planning",

@@ -19,6 +19,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import CONTACT, Recipe
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.report.figures.counts import draw_errors_over_disks
 from sainet.studies import Scale
 from sainet.studies.paper_setup import IN, SAIN, chunk_of, in_batches, physics
 from sainet.studies.steps import Evaluate, Join, Load, Simulate, Step, Train
@@ -156,6 +157,8 @@ NUMBERS = Study(
         )
         for disks in TESTED[1:]
     ),
+    figure=draw_errors_over_disks,
+    figure_name="any-number.svg",
 )
 GAPS = Study(
     question="How do errors depend on the gap between two disks at the start?",

@@ -1,0 +1,88 @@
+"""Errors over the number of disks, an arrangement in each column."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
+
+from sainet.evaluation.measurements import Condition
+from sainet.evaluation.summary import Summary
+from sainet.report.figures import canvas
+from sainet.report.palette import styles_of
+
+_METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
+_TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10)  # mm or degrees
+
+Line = list[tuple[int, float]]  # number of disks, and error
+
+
+def draw_errors_over_disks(summary: Summary, path: Path) -> Path:
+    """Draw each model's error, the mean of all disks, over the number of disks.
+
+    Args:
+        summary: of conditions with the factors ``disks`` and ``arrangement``; two disks
+            have one arrangement, and stand in every column.
+        path: where to write; ``.svg`` or ``.png``.
+    """
+    found = {str(each.factors["arrangement"]) for each in summary.conditions}
+    styles = styles_of((row.model for row in summary.rows), summary.models)
+    with canvas.house_look():
+        figure = canvas.new_figure(1.6 + 3.1 * len(found), 5.6)
+        panels = figure.subplots(2, len(found), sharex=True, sharey="row")
+        for (metric, label), row in zip(_METRICS.items(), panels, strict=True):
+            row[0].set_ylabel(f"mean {label}")
+            for arrangement, axes in zip(sorted(found), row, strict=True):
+                lines = _lines(summary, list(styles), arrangement, metric)
+                for name, line in lines.items():
+                    look = canvas.line_look(styles[name]) | {"marker": "o"}
+                    axes.plot(*zip(*line, strict=True), **look, markersize=3.5)
+                _set_axes(axes, lines)
+        for arrangement, axes in zip(sorted(found), panels[0], strict=True):
+            axes.set_title(f"{arrangement}s".capitalize())
+        for axes in panels[1]:
+            axes.set_xlabel("disks")
+        names = [style.label for style in styles.values()]
+        lines = panels[0][0].get_lines()
+        figure.legend(lines, names, loc="outside lower center", ncols=3)
+        return canvas.save(figure, path)
+
+
+def _lines(
+    summary: Summary, models: list[str], arrangement: str, metric: str
+) -> Mapping[str, Line]:
+    """Return the errors of each model in an arrangement, from few disks to many."""
+    fewest = min(int(each.factors["disks"]) for each in summary.conditions)
+
+    def belongs(each: Condition) -> bool:
+        return each.factors["disks"] == fewest or (
+            each.factors["arrangement"] == arrangement
+        )
+
+    places = sorted(
+        (int(each.factors["disks"]), each.label)
+        for each in summary.conditions
+        if belongs(each)
+    )
+    return {
+        model: [
+            (disks, float(np.mean(errors)))
+            for disks, label in places
+            if (errors := summary.errors(model, metric, label))
+        ]
+        for model in models
+    }
+
+
+def _set_axes(axes: Axes, lines: Mapping[str, Line]) -> None:
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    counts = sorted({disks for line in lines.values() for disks, _ in line})
+    axes.xaxis.set_major_locator(FixedLocator(counts))
+    axes.yaxis.set_major_locator(FixedLocator(_TICKS))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+    axes.xaxis.set_minor_locator(NullLocator())
+    canvas.add_grid(axes)
