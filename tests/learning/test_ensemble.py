@@ -1,5 +1,6 @@
 """Ensembles: the mean of their members, their regions, their files and refusals."""
 
+import html
 import json
 import shutil
 
@@ -24,6 +25,7 @@ from sainet.models.library import load_model
 from sainet.runs.errors import BadCheckpoint, BadSetting, BadStore
 from sainet.scenes.pushes import command_path
 from sainet.scenes.state import pack_motion
+from sainet.studies.run_report import page_of
 
 PUSHES, MEMBERS = 60, 3
 RECIPE = PAPER.changed(iterations=3, batch_size=8, steps=12, log_every=1)
@@ -57,6 +59,13 @@ def test_the_mean_of_the_members_is_predicted(folder, batch):
     assert np.ptp(np.stack(each), axis=0).max() > 1e-4
     found = motion(load_model(str(folder)), batch)
     assert np.allclose(found, np.mean(each, axis=0), atol=1e-5)
+
+
+def test_the_report_of_an_ensemble_says_what_it_is(folder):
+    page = html.unescape(page_of(folder))
+    assert f", ensemble, from {PUSHES} pushes" in page
+    assert f"the mean of {MEMBERS} networks" in page
+    assert "in which region a push ends" in page
 
 
 def test_two_advances_are_one_long_one(folder, batch):

@@ -6,12 +6,17 @@ from pathlib import Path
 from sainet.engines import RECORDED
 from sainet.learning.log import LogLine, read_log
 from sainet.models.card import CARD, Card, read_card
+from sainet.models.ensemble_card import EnsembleCard, is_ensemble, load_ensemble
 from sainet.models.process_card import ProcessCard, is_process, read_process_card
 
 _SETUPS = {
     "robot": "a pusher that follows a path",
     "direct-force": "a pusher that a force drives",
 }
+_REGIONS = (
+    "It states in which region a push ends with a probability of 90 %, set on pushes "
+    "that no fit saw; 'sainet evaluate' shows whether that holds on others."
+)
 
 
 def read_any_card(folder: Path) -> Card | ProcessCard | None:
@@ -22,11 +27,15 @@ def read_any_card(folder: Path) -> Card | ProcessCard | None:
     """
     if is_process(folder):
         return read_process_card(folder)
+    if is_ensemble(folder):
+        return load_ensemble(folder)[1]
     return read_card(folder) if (folder / CARD).is_file() else None
 
 
 def sentences_of(folder: Path) -> list[str]:
     """Return what the trained model in a folder is; nothing where there is none."""
+    if is_ensemble(folder):
+        return [*of_ensemble(*load_ensemble(folder)[1:], folder)]
     card = read_any_card(folder)
     if isinstance(card, ProcessCard):
         return [*of_process(card, folder)]
@@ -54,10 +63,18 @@ def of_process(card: ProcessCard, folder: Path) -> Iterator[str]:
     yield _made_of(card)
     words = ", ".join(name.replace("_", " ") for name in card.inputs)
     yield f"Its inputs at the start of a push are: {words}."
+    yield _REGIONS
+    yield _purpose(card, folder)
+
+
+def of_ensemble(card: Card, found: EnsembleCard, folder: Path) -> Iterator[str]:
+    """Yield what an ensemble is, and what to do next."""
+    yield _made_of(card)
     yield (
-        "It states in which region a push ends with a probability of 90 %, set on "
-        "pushes that no fit saw; 'sainet evaluate' shows whether that holds on others."
+        f"It is the mean of {len(found.members)} networks, whose training differs in "
+        "its seed only."
     )
+    yield _REGIONS
     yield _purpose(card, folder)
 
 
