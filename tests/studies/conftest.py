@@ -17,6 +17,7 @@ def tiny(monkeypatch):
     """Every study as small as it can be."""
     sizes = {"quick": Sizes(pushes=6, tests=4, iterations=1)}
     places: dict[str, object] = {"paper_setup.SIZES": sizes}
+    places["paper_setup._QUICK_BATCH"] = 2  # of one size, to share compiled code
     places["pretrained.SIZES"] = {"quick": (4, 4, 1)}
     places["data_efficiency.PUSHES"] = {"quick": (3, 6)}
     places["data_efficiency.AGAIN"] = {"quick": 6}

@@ -48,6 +48,7 @@ def tiny_labs(monkeypatch):
     monkeypatch.setattr(lab_pushes, "SIZES", sizes)
     monkeypatch.setattr(lab_control, "TRIALS", {"quick": (1, 2)})
     monkeypatch.setattr("sainet.studies.paper_setup._QUICK_ITERATIONS", 1)
+    monkeypatch.setattr("sainet.studies.paper_setup._QUICK_BATCH", 2)
 
 
 @pytest.mark.slow
