@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from tyro.conf import Positional
 
-from sainet.cli.devices import use_devices
+from sainet.cli.devices import compile_fast_elsewhere, use_devices
 from sainet.cli.help import message
 from sainet.cli.output import Bars, Json, Output
 from sainet.runs.errors import BadInput, MissingExtra
@@ -62,6 +62,8 @@ class Reproduce:
     def run(self) -> Json:
         """Run the studies one after another, or the steps of a shard."""
         use_devices(self.devices)
+        if self.scale == "quick":
+            compile_fast_elsewhere()
         at_once = self._steps_at_once()
         shard = self.machines.share
         from sainet.studies import STUDIES, load_study

@@ -21,7 +21,8 @@ from sainet.studies.runner import Bar, Runner
 from sainet.studies.steps import Join, Load, Place, Step
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": (2, 5), "paper": (100, 60)}  # and the most pushes of each
+TRIALS = {"quick": (2, 3), "paper": (100, 60)}  # and the most pushes of each
+_FEW = 4  # trials
 MODELS = (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
 GOALS = ("easy", "hard")
 PLANNERS = ("greedy", "tree")
@@ -44,8 +45,8 @@ class RunTrials(Step[Measurements]):
 
     @property
     def place(self) -> Place:
-        """Over all processes: each runs episodes."""
-        return Place.SPREAD
+        """Over all processes, each of which runs episodes; few in one."""
+        return Place.APART if self.config.trials <= _FEW else Place.SPREAD
 
     def run(self, runner: Runner) -> Measurements:
         """Return the outcomes; finished episodes are kept."""
