@@ -14,7 +14,7 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Join, Load
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": (2, 3), "paper": (100, 60)}  # and the most pushes of each
+TRIALS = {"quick": (1, 2), "paper": (100, 60)}  # and the most pushes of each
 WRONG = 0.1  # fraction of each mass and radius
 NOMINAL, TRUE = physics()
 

@@ -17,7 +17,7 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Join, Load
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": (2, 3), "paper": (100, 60)}  # and the most pushes of each
+TRIALS = {"quick": (1, 2), "paper": (100, 60)}  # and the most pushes of each
 MODELS = (*physics(), Load(SAIN, "sain"), Load(SAIN_ANY, "sain-any"))
 _FACTORS = ("goals", "disks", "obstacles")
 EASY, HARD = "2 disks, easy", "2 disks, hard"

@@ -22,7 +22,7 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Apart, First, Join, Simulate
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": (2, 3), "paper": (50, 60)}  # and the most pushes of each
+TRIALS = {"quick": (1, 2), "paper": (50, 60)}  # and the most pushes of each
 PUSHES = {"quick": (20,), "paper": (50, 300)}
 _SIMULATOR, _SETTINGS = SIMULATORS["planar"], ProcessSettings(features="angle")
 _PROCESS = ModelId(kind="gp", simulator=_SIMULATOR, features=_SETTINGS.features)

@@ -21,7 +21,7 @@ from sainet.studies.steps import Load
 from sainet.studies.study import Plan, Scope, Study
 
 # Trials of each model and condition in every lab, and pushes of an episode.
-TRIALS = {"quick": (1, 3), "paper": (20, 60)}
+TRIALS = {"quick": (1, 2), "paper": (20, 60)}
 HARD = "hard"
 ON_PLYWOOD = "hard, plywood"
 SWAPPED = "hard, swapped disks"

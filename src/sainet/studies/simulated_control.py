@@ -21,7 +21,7 @@ from sainet.studies.runner import Bar, Runner
 from sainet.studies.steps import Join, Load, Place, Step
 from sainet.studies.study import Plan, Scope, Study
 
-TRIALS = {"quick": (2, 3), "paper": (100, 60)}  # and the most pushes of each
+TRIALS = {"quick": (1, 2), "paper": (100, 60)}  # and the most pushes of each
 _FEW = 4  # trials
 MODELS = (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
 GOALS = ("easy", "hard")
