@@ -41,7 +41,7 @@ TESTED = (2, 3, 5, 8)  # disks; two have one arrangement
 ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
 GAPS_MM = (-2, -1, 0, 1, 2, 5)
 # Training pushes of each number of disks, test pushes of each condition, iterations.
-SIZES = {"quick": (60, 40, 20), "paper": (1500, 500, None)}
+SIZES = {"quick": (48, 16, 10), "paper": (1500, 500, None)}
 TRAININGS = 5  # of each network
 _TRAINING_SEED, _TEST_SEED = 100, 200
 

@@ -16,9 +16,9 @@ from sainet.studies.study import RECORDED as RECORDED_PUSHES
 from sainet.studies.study import Plan, Scope, Study
 
 NETWORKS = (IN, SAIN)
-PUSHES = {"quick": (50, 120), "paper": (50, 150, 500, 1500, 4500)}
+PUSHES = {"quick": (32, 64), "paper": (50, 150, 500, 1500, 4500)}
 TRAININGS, OTHER_TRAININGS = 3, 5  # of each network
-AGAIN = {"quick": 120, "paper": 500}  # pushes, with other seeds
+AGAIN = {"quick": 64, "paper": 500}  # pushes, with other seeds
 IN_FULL = Condition(
     label="all, trained in full", factors={"training_pushes": 4500, "iterations": "all"}
 )

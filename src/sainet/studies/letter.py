@@ -122,7 +122,7 @@ class World:
         return Simulate(f"{self.label}-{label}", whole)
 
 
-REDUCED = {"quick": Sizes(100, 50, 20), "paper": Sizes(1000, 500, 1000)}
+REDUCED = {"quick": Sizes(48, 16, 10), "paper": Sizes(1000, 500, 1000)}
 # A world whose Physics row is near the published one (`published_physics`): the damper
 # is so weak that the friction, which no model knows, decides how far disks move. That
 # is twice the paper's stroke for disk 1.

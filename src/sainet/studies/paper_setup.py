@@ -23,8 +23,8 @@ SAIN_BULLET, SAIN, SAIN_TRUE = (
     for name in ("bullet", "planar", "planar-true")
 )
 NETWORKS = (IN, SAIN_BULLET, SAIN, SAIN_TRUE)
-_QUICK_ITERATIONS = 20
-_MANY = 500  # pushes
+_QUICK_ITERATIONS = 10
+_MANY, _CHUNK = 500, 16  # pushes
 _QUICK_BATCH = 10  # pushes: of one size, whatever the data, to share compiled code
 _TEST_SEED, _VALIDATION_SEED = 1, 2
 
@@ -38,7 +38,7 @@ class Sizes:
     iterations: int
 
 
-SIZES = {"quick": Sizes(120, 40, 60), "paper": Sizes(4500, 500, 10_000)}
+SIZES = {"quick": Sizes(64, 16, 20), "paper": Sizes(4500, 500, 10_000)}
 
 
 class WithBystander(steps.Apart[Store]):
@@ -66,7 +66,7 @@ def chunk_of(pushes: int) -> int:
 
     Datasets share compiled programs if their chunks are equal.
     """
-    return 250 if pushes >= _MANY else min(20, pushes)
+    return 250 if pushes >= _MANY else min(_CHUNK, pushes)
 
 
 @dataclass(frozen=True)

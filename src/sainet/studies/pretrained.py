@@ -33,7 +33,7 @@ from sainet.studies.steps import Evaluate, Join, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
 
 # Training pushes, test pushes, iterations.
-SIZES = {"quick": (20, 20, 20), "paper": (LONG_PUSHES.pushes, 200, 3000)}
+SIZES = {"quick": (16, 16, 10), "paper": (LONG_PUSHES.pushes, 200, 3000)}
 RECIPE = PAPER.changed(batch_size=50, halve_every=750, steps=10_000)
 IN_LONG = ModelId(kind="in", data="stroke")
 SAIN_ANY = structs.replace(MIXED, name="sain-any")

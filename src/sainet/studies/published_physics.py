@@ -31,7 +31,7 @@ SPEEDS_MM_S = (50.0, 5.0)  # of the robot; the slower one takes the paper's 2 s
 GAPS_MM = (0.0, -2.0, -4.0)
 NOISES = (1, 3, 10)  # multiples of the noise of the pusher: of its path or force
 FORCE_STEPS = (200, 480)  # that count: the paper's, and the whole 2 s
-PUSHES = {"quick": 20, "paper": 100}
+PUSHES = {"quick": 16, "paper": 100}
 NEAR = 1.2  # ratio to the published error, either way
 _SEED = 300
 

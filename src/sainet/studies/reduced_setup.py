@@ -15,7 +15,7 @@ from sainet.studies.paper_setup import Sizes, chunk_of, in_batches, physics
 from sainet.studies.steps import Evaluate, Simulate, Step, Train
 from sainet.studies.study import Scope
 
-SIZES = {"quick": Sizes(60, 40, 20), "paper": Sizes(1500, 500, 1500)}
+SIZES = {"quick": Sizes(48, 16, 10), "paper": Sizes(1500, 500, 1500)}
 TRAININGS = 3  # of each network
 # With predictions in the datasets; planar is the default of networks without an engine.
 ENGINES = ("planar", "bullet", "bullet-true")
