@@ -2,8 +2,9 @@
 
     python tools/durations.py runs/whole-paper runs/recorded
 
-reads the durations of a finished `sainet reproduce --recorded runs/recorded` at the
-quick scale, and writes src/sainet/studies/durations.json.
+reads the durations of a finished `XLA_FLAGS= sainet reproduce --recorded runs/recorded`
+at the quick scale, and writes src/sainet/studies/durations.json. The variable is set to
+nothing so that everything is compiled as at the paper's scale.
 """
 
 import sys
