@@ -61,9 +61,11 @@ def test_the_mean_of_the_members_is_predicted(folder, batch):
     assert np.allclose(found, np.mean(each, axis=0), atol=1e-5)
 
 
-def test_the_report_of_an_ensemble_says_what_it_is(folder):
+def test_the_report_of_an_ensemble_says_what_it_is(folder, store):
     page = html.unescape(page_of(folder))
-    assert f", ensemble, from {PUSHES} pushes" in page
+    rest, held = split_rows(store.repeats(), CALIBRATION, RECIPE.seed)
+    assert f", ensemble, from {len(rest)} " in page
+    assert len(rest) + len(held) == PUSHES
     assert f"the mean of {MEMBERS} networks" in page
     assert "in which region a push ends" in page
 
