@@ -54,7 +54,8 @@ def _measured(runs: int, worlds: int) -> list[tuple[float, float]]:
         [one] * (os.cpu_count() or 1), context="spawn"
     )
     try:
-        _rate(many, 1), _rate(processes, 1)  # compiles, and starts the processes
+        for each in (many, processes):  # compiles, and starts the processes
+            _rate(each, 1)
         return [(_rate(many, 1), _rate(processes, _STEPS)) for _ in range(runs)]
     finally:
         processes.close()

@@ -9,7 +9,10 @@ from sainet.runs.workers import core_count
 __all__ = ["compile_fast_elsewhere", "use_cache", "use_devices"]
 
 # Compilation takes a sixth of the time, and compiled code three times as long.
-_FAST = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+_FAST: dict[str, str | bool] = {
+    "xla_backend_optimization_level": "0",
+    "xla_cpu_use_fusion_emitters": False,
+}
 
 
 def use_devices(count: int | None = None) -> None:

@@ -36,8 +36,9 @@ def draw_errors_over_disks(summary: Summary, path: Path) -> Path:
             for arrangement, axes in zip(sorted(found), row, strict=True):
                 lines = _lines(summary, list(styles), arrangement, metric)
                 for name, line in lines.items():
-                    look = canvas.line_look(styles[name]) | {"marker": "o"}
-                    axes.plot(*zip(*line, strict=True), **look, markersize=3.5)
+                    look = canvas.line_look(styles[name])
+                    look |= canvas.LineLook(marker="o", markersize=3.5)
+                    axes.plot(*zip(*line, strict=True), **look)
                 _set_axes(axes, lines)
         for arrangement, axes in zip(sorted(found), panels[0], strict=True):
             axes.set_title(f"{arrangement}s".capitalize())
