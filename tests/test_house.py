@@ -320,7 +320,7 @@ CONNECTIONS = {
     "provenance of identified engines": 10,
     "contact networks and arrangements of disks": 165,
     "obstacles and other target disks": 25,
-    "episodes of several models side by side": 45,
+    "episodes of several models side by side": 50,
     # Also durations, the report of all studies, and fewer training runs.
     "the whole paper": 262,
     # Shares of datasets, trials and evaluations, the options of five commands, and

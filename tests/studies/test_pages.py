@@ -4,6 +4,7 @@ import re
 import shutil
 
 import pytest
+from msgspec import structs
 
 from sainet.evaluation.measurements import read_measurements
 from sainet.models.card import IDENTIFIED
@@ -139,3 +140,18 @@ def test_figures_of_benchmarks_are_kept_case_by_case(tmp_path):
         path.write_text(text)
         with pytest.raises(BadInput, match=r"bench.json: no figures by case \("):
             keep(path, tmp_path)
+
+
+def test_episodes_are_kept_by_their_goals_in_the_order_of_models(tmp_path):
+    known = Evidence(REPOSITORY).episodes()["easy-3-disks"]
+    path = tmp_path / "run" / "episodes" / f"{known[0].trial:03d}.json"
+    for record in reversed(known):
+        write_document(path, record)
+        keep(path, tmp_path)
+    assert Evidence(tmp_path).episodes() == {"easy-3-disks": known}
+    models = [record.model for record in known]
+    assert models == ["physics-true", "sain", "sain-any"]
+    assert [record.solved for record in known] == [True, False, True]  # as on the page
+    write_document(path, structs.replace(known[0], model="runs/mine"))
+    with pytest.raises(BadInput, match="model is runs/mine, not one of"):
+        keep(path, tmp_path)

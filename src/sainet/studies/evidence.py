@@ -1,5 +1,6 @@
 """Evidence: what `results/` keeps of studies, identifications and benchmarks."""
 
+import lzma
 from collections import defaultdict
 from pathlib import Path
 
@@ -81,9 +82,11 @@ class Evidence:
     def episodes(self) -> dict[str, list[EpisodeRecord]]:
         """Return the kept episodes of each goal, in the order of `MODELS`."""
         found: dict[str, list[EpisodeRecord]] = defaultdict(list)
-        for path in sorted((self.folder / _EPISODES).glob("*/*.json")):
-            record = documents.read_document(path, EpisodeRecord)
-            found[path.parent.name].append(record)
+        for path in sorted((self.folder / _EPISODES).glob("*/*.json.xz")):
+            text = lzma.decompress(path.read_bytes())
+            found[path.parent.name].append(
+                msgspec.json.decode(text, type=EpisodeRecord)
+            )
         for records in found.values():
             records.sort(key=lambda each: MODELS.index(each.model))
         return dict(found)
@@ -113,8 +116,8 @@ def keep(path: Path, root: Path) -> None:
         if record.model not in MODELS:
             raise BadInput(f"{path}: model is {record.model}, not one of {MODELS}.")
         goal = f"{record.goals}-{len(record.radius_mm)}-disks"
-        file = results / _EPISODES / goal / f"{record.model}.json"
-        documents.write_document(file, record)
+        file = results / _EPISODES / goal / f"{record.model}.json.xz"
+        documents.write_bytes(file, lzma.compress(msgspec.json.encode(record)))
         return
     if path.is_file():
         for case, figures in _cases(path).items():

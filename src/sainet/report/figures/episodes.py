@@ -55,7 +55,7 @@ def draw_episodes(
 def draw_side_by_side(records: Sequence[EpisodeRecord], path: Path) -> Path:
     """Draw episodes of several models with one goal, under the names of the models."""
     return draw_episodes(
-        records, path, lambda each: f"{style_of(each.model).label}: {outcome(each)}"
+        records, path, lambda each: f"{style_of(each.model).label}:\n{outcome(each)}"
     )
 
 
@@ -81,7 +81,8 @@ def draw_episode(axes: Axes, record: EpisodeRecord, title: str) -> None:
     _disk(axes, record.goal_mm, record.tolerance_mm, facecolor=TARGET, zorder=4)
     end = path[-1, record.moved, :2]
     axes.plot(*end, "x", color="white", markersize=6, markeredgewidth=1.6, zorder=5)
-    title = textwrap.fill(title, _TITLE_WIDTH)
+    lines = (textwrap.fill(line, _TITLE_WIDTH) for line in title.splitlines())
+    title = "\n".join(lines)
     off = record.final_mm
     axes.set_title(title if off is None else f"{title}\n{off:.1f} mm off")
     axes.set_aspect("equal")
