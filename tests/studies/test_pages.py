@@ -155,3 +155,6 @@ def test_episodes_are_kept_by_their_goals_in_the_order_of_models(tmp_path):
     write_document(path, structs.replace(known[0], model="runs/mine"))
     with pytest.raises(BadInput, match="model is runs/mine, not one of"):
         keep(path, tmp_path)
+    (tmp_path / "results/episodes/easy-3-disks/sain.json.xz").write_bytes(b"cut")
+    with pytest.raises(BadInput, match=r"sain.json.xz: no episode \("):
+        Evidence(tmp_path).episodes()

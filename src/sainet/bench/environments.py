@@ -1,6 +1,5 @@
 """Pushes per second of the vector environment, and of Bullet's world in processes."""
 
-import os
 from functools import partial
 from importlib.util import find_spec
 from statistics import median
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from sainet.bench import Figures
 from sainet.bench.timing import check_runs
+from sainet.runs.workers import core_count
 
 if TYPE_CHECKING:
     from gymnasium.vector import VectorEnv
@@ -31,7 +31,7 @@ def bench_environments(runs: int = 5, *, worlds: int = WORLDS) -> Figures:
         `reason`), and the sizes of the measurement.
     """
     check_runs(runs)
-    known = {"worlds": worlds, "processes": os.cpu_count(), "runs": runs}
+    known = {"worlds": worlds, "processes": core_count(), "runs": runs}
     names = ("vector_pushes_per_s", "bullet_pushes_per_s", "bullet_ratio")
     if not (find_spec("gymnasium") and find_spec("pybullet")):
         return dict.fromkeys(names) | known | {"reason": _MISSING}
@@ -50,9 +50,7 @@ def _measured(runs: int, worlds: int) -> list[tuple[float, float]]:
 
     many = PushDisksVector(worlds)
     one = partial(PushDisks, world="bullet")
-    processes = gymnasium.vector.AsyncVectorEnv(
-        [one] * (os.cpu_count() or 1), context="spawn"
-    )
+    processes = gymnasium.vector.AsyncVectorEnv([one] * core_count(), context="spawn")
     try:
         for each in (many, processes):  # compiles, and starts the processes
             _rate(each, 1)

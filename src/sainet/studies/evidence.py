@@ -83,13 +83,15 @@ class Evidence:
         """Return the kept episodes of each goal, in the order of `MODELS`."""
         found: dict[str, list[EpisodeRecord]] = defaultdict(list)
         for path in sorted((self.folder / _EPISODES).glob("*/*.json.xz")):
-            text = lzma.decompress(path.read_bytes())
-            found[path.parent.name].append(
-                msgspec.json.decode(text, type=EpisodeRecord)
-            )
-        for records in found.values():
-            records.sort(key=lambda each: MODELS.index(each.model))
-        return dict(found)
+            try:
+                text = lzma.decompress(documents.read_file(path))
+                record = msgspec.json.decode(text, type=EpisodeRecord)
+            except (lzma.LZMAError, EOFError, msgspec.MsgspecError) as error:
+                raise BadInput(f"{path}: no episode ({error}); keep it anew.") from None
+            found[path.parent.name].append(record)
+        return {
+            k: sorted(v, key=lambda e: MODELS.index(e.model)) for k, v in found.items()
+        }
 
 
 def described(machine: Manifest) -> str:

@@ -192,6 +192,9 @@ def scaled(recipe: Recipe, scale: Scale, pushes: int) -> Recipe:
 
 
 def in_batches(recipe: Recipe, scale: Scale, pushes: int) -> Recipe:
-    """Return a recipe whose batches have no more pushes than there are."""
+    """Return a recipe whose batches have no more pushes than there are.
+
+    At the quick scale they have no more than ten, whatever the data.
+    """
     most = min(pushes, _QUICK_BATCH) if scale == "quick" else pushes
     return recipe.changed(batch_size=min(recipe.optimiser.batch_size, most))

@@ -36,7 +36,7 @@ def draw_obstacles(
         seed: common to all trials.
         trial: index of the trial.
         way: of the target disk.
-        placed: centres of the other disks, m.
+        placed: centres of all other disks, the target disk among them, m.
         radius: of those disks, then of the obstacles, m.
 
     Raises:

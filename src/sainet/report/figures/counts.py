@@ -10,9 +10,9 @@ from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.report.figures import canvas
+from sainet.report.figures.curves import METRICS
 from sainet.report.palette import styles_of
 
-_METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10)  # mm or degrees
 
 Line = list[tuple[int, float]]  # number of disks, and error
@@ -26,21 +26,21 @@ def draw_errors_over_disks(summary: Summary, path: Path) -> Path:
             have one arrangement, and stand in every column.
         path: where to write; ``.svg`` or ``.png``.
     """
-    found = {str(each.factors["arrangement"]) for each in summary.conditions}
+    found = sorted({str(each.factors["arrangement"]) for each in summary.conditions})
     styles = styles_of((row.model for row in summary.rows), summary.models)
     with canvas.house_look():
         figure = canvas.new_figure(1.6 + 3.1 * len(found), 5.6)
         panels = figure.subplots(2, len(found), sharex=True, sharey="row")
-        for (metric, label), row in zip(_METRICS.items(), panels, strict=True):
+        for (metric, label), row in zip(METRICS.items(), panels, strict=True):
             row[0].set_ylabel(f"mean {label}")
-            for arrangement, axes in zip(sorted(found), row, strict=True):
+            for arrangement, axes in zip(found, row, strict=True):
                 lines = _lines(summary, list(styles), arrangement, metric)
                 for name, line in lines.items():
                     look = canvas.line_look(styles[name])
                     look |= canvas.LineLook(marker="o", markersize=3.5)
                     axes.plot(*zip(*line, strict=True), **look)
                 _set_axes(axes, lines)
-        for arrangement, axes in zip(sorted(found), panels[0], strict=True):
+        for arrangement, axes in zip(found, panels[0], strict=True):
             axes.set_title(f"{arrangement}s".capitalize())
         for axes in panels[1]:
             axes.set_xlabel("disks")

@@ -117,7 +117,7 @@ def draw_history(model: str, log: Sequence[LogLine], path: Path) -> Path:
 
 
 FACTOR = "training_pushes"
-_METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
+METRICS = {"pos_mm": "position error (mm)", "rot_deg": "rotation error (deg)"}
 _TICKS = (0.2, 0.3, 0.5, 0.7, 1, 1.5, 2, 3, 5, 7, 10, 15, 20)  # mm or degrees
 # Ratios: of sizes whose labels do not touch; of errors on a logarithmic scale.
 _APART, _WIDE = 1.6, 4
@@ -152,12 +152,12 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         if row.condition in sizes
     ]
     # Where only the ends of pushes were observed, no mean over a push is another.
-    means = ((row.values, m) for _, row in rows for m in _METRICS)
+    means = ((row.values, m) for _, row in rows for m in METRICS)
     ends = all(v.get(m) in (None, v.get(f"final_{m}")) for v, m in means)
     end = "final " if ends else ""
     styles = styles_of((each.row.model for each in rows), summary.models)
     bodies = sorted({each.row.body for each in rows})
-    cases = [(metric, body) for metric in _METRICS for body in bodies]
+    cases = [(metric, body) for metric in METRICS for body in bodies]
     down, across = (1, 2) if len(bodies) == 1 else (2, len(bodies))
     with canvas.house_look():
         figure = canvas.new_figure(1.4 + 4.1 * across, 3.3 * down)
@@ -165,7 +165,7 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         for (metric, body), axes in zip(cases, panels, strict=True):
             _set_axes(axes, sorted(sizes.values()))
             axes.set_title(f"Disk {body}")
-            axes.set_ylabel(f"mean {end}{_METRICS[metric]}")
+            axes.set_ylabel(f"mean {end}{METRICS[metric]}")
             for name, style in styles.items():
                 _draw_model(axes, style, _of(rows, name, body), metric)
             _set_scale(axes)
