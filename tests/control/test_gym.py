@@ -182,6 +182,8 @@ def test_bad_options_of_reset_are_named_and_lose_nothing(options, says):
     [
         ({"pushes": 0}, "`pushes` is 0"),
         ({"disks": 50}, "`disks` is 50; .*2 m long"),
+        ({"obstacles": 1}, "`obstacles` is 1"),
+        ({"moved": 3}, "`moved` is 3"),
     ],
 )
 def test_impossible_options_are_named(options, says):
@@ -233,8 +235,9 @@ def test_models_are_given_no_true_friction():
         assert scene.friction_field is None
 
 
-def test_a_picture_has_the_disks_where_they_are():
-    env = make(render_mode="rgb_array")
+@pytest.mark.parametrize("disks", [{}, {"disks": 3, "moved": 2}])
+def test_a_picture_has_the_disks_where_they_are(disks):
+    env = make(render_mode="rgb_array", **disks)
     env.reset(seed=0)
     picture = env.render()
     assert picture.shape == (480, 480, 3) and picture.dtype == np.uint8
@@ -242,7 +245,8 @@ def test_a_picture_has_the_disks_where_they_are():
     pixel = running.view.side / 480
     centres = np.asarray(running.trial.robot.truth.position)
     radius = np.asarray(running.trial.robot.scene.radius)
-    for disk, color in enumerate((raster.PUSHED, raster.MOVED)):
+    colors = (raster.PUSHED, raster.MOVED, raster.OTHER)
+    for disk, color in enumerate(colors[: len(centres)]):
         rgb = [int(color[i : i + 2], 16) for i in (1, 3, 5)]
         rows, columns = np.nonzero((picture == rgb).all(axis=-1))
         middle = np.array([columns.mean() - 239.5, 239.5 - rows.mean()])
@@ -259,16 +263,19 @@ def test_pictures_have_the_colours_of_reports():
 
 @pytest.fixture(scope="module")
 def many():
-    return make_many(5, goals="hard", pushes=2, noise_level="none")
+    return make_many(5)
 
 
-def test_many_environments_equal_single_ones(many):
+@pytest.mark.parametrize("disks", [{}, {"disks": 4, "obstacles": 1, "moved": 2}])
+def test_many_environments_equal_single_ones(disks):
     """Without noise, the batched tables and the robot move the disks alike."""
+    options = {"goals": "hard", "pushes": 2, "noise_level": "none", **disks}
+    many = make_many(5, **options)
     actions = np.random.default_rng(0).integers(72, size=(3, 5))
     found = [(many.reset(seed=7)[0], None, None, None, None)]
     found += [many.step(each) for each in actions]
     for index in (0, 4):
-        env = make(goals="hard", pushes=2, noise_level="none")
+        env = make(**options)
         assert_same(env.reset(seed=7 + index)[0], row(found[0][0], index))
         for action, step in zip(actions[:2, index], found[1:3], strict=True):
             observation, *scalars, info = env.step(int(action))

@@ -11,14 +11,14 @@ from sainet.tasks.obstacles import Way, draw_obstacles
 
 RADIUS = np.array([0.054, 0.059, 0.05, 0.056])
 ROW = np.array([[0.0, 0.0], [0.113, 0.0]])
-WAY = Way(ROW[1], ROW[1] + 0.177 * np.array([np.cos(0.5), np.sin(0.5)]), RADIUS[1])
+WAY = Way(1, ROW[1] + 0.177 * np.array([np.cos(0.5), np.sin(0.5)]))
 
 
 def gap_to_way(place: np.ndarray, radius: float) -> float:
     """The least gap to the target disk at a thousand places of its way (m)."""
     share = np.linspace(0, 1, 1000)[:, None]
-    path = WAY.start + share * (WAY.goal - WAY.start)
-    return float(np.linalg.norm(path - place, axis=1).min() - WAY.radius - radius)
+    path = ROW[1] + share * (WAY.goal - ROW[1])
+    return float(np.linalg.norm(path - place, axis=1).min() - RADIUS[1] - radius)
 
 
 @pytest.mark.parametrize("trial", range(20))

@@ -60,9 +60,8 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
     )
     if config.obstacles:
         row = np.asarray(state.position)[: -config.obstacles]
-        radii = np.asarray(true.radius, np.float64)
-        way = Way(row[moved], goal, float(radii[moved]))
-        others = draw_obstacles(config.seed, index, way, row, radii)
+        way, radius = Way(moved, goal), np.asarray(true.radius)
+        others = draw_obstacles(config.seed, index, way, row, radius)
         robot.arrange(_with_last(state, others))
         robot.observe()
     task = PushToGoal(

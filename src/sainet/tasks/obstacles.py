@@ -15,9 +15,8 @@ _TRIES = 200  # for each obstacle
 class Way(NamedTuple):
     """The straight way of the target disk to its goal."""
 
-    start: Float[np.ndarray, " 2"]  # m
+    target: int  # index of that disk
     goal: Float[np.ndarray, " 2"]  # m
-    radius: float  # of the target disk, m
 
 
 def draw_obstacles(
@@ -36,18 +35,21 @@ def draw_obstacles(
         seed: common to all trials.
         trial: index of the trial.
         way: of the target disk.
-        placed: centres of all other disks, the target disk among them, m.
+        placed: centres of the disks in the row, m.
         radius: of those disks, then of the obstacles, m.
 
     Raises:
         BadInput: there is no room for so many.
     """
     rng = np.random.default_rng([_STREAM, seed, trial])
+    radius = np.asarray(radius, np.float64)
     found = list(np.asarray(placed, np.float64))
     while len(found) < len(radius):
         own = float(radius[len(found)])
         for _ in range(_TRIES):
-            place = _beside(rng, way, own)
+            place = _beside(
+                rng, found[way.target], way.goal, float(radius[way.target]) + own
+            )
             apart = np.hypot(*(np.array(found) - place).T) - radius[: len(found)] - own
             if apart.min() >= _CLEAR_MM[0] / 1000:
                 found.append(place)
@@ -61,10 +63,13 @@ def draw_obstacles(
 
 
 def _beside(
-    rng: np.random.Generator, way: Way, radius: float
+    rng: np.random.Generator,
+    start: Float[np.ndarray, " 2"],
+    goal: Float[np.ndarray, " 2"],
+    radii: float,
 ) -> Float[np.ndarray, " 2"]:
-    """Return a random place beside the way for a disk of some radius."""
-    along = way.goal - way.start
+    """Return a random place beside the way, for a disk of that sum of both radii."""
+    along = goal - start
     across = np.array([-along[1], along[0]]) / np.hypot(*along) * rng.choice([-1, 1])
-    clear = way.radius + radius + rng.uniform(*_CLEAR_MM) / 1000
-    return way.start + rng.uniform() * along + clear * across
+    clear = radii + rng.uniform(*_CLEAR_MM) / 1000
+    return start + rng.uniform() * along + clear * across

@@ -33,7 +33,12 @@ class PushDisksConfig:
     noise_level: NoiseLevel = "default"
     """Scale of the noise of planar and bullet: none, default or paper-like."""
     disks: int = 2
-    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
+    """Number of disks; disk 1 is pushed."""
+    moved: int | None = None
+    """Number of the target disk in the row. Default: the last one."""
+    obstacles: int = 0
+    """How many of the disks, the last ones, lie beside the way of the target disk
+    instead of in the row, at random."""
     pushes: int = 60
     """Number of pushes after which an episode is truncated."""
     lab: int = 0
@@ -58,6 +63,8 @@ class PushDisksConfig:
         """Return the settings of `sainet control` with the same trials."""
         usual = ControlConfig(
             disks=self.disks,
+            moved=self.moved,
+            obstacles=self.obstacles,
             noise_level=self.noise_level,
             lab=self.lab,
             surface=self.surface,

@@ -1,6 +1,7 @@
 """Pictures of disks on a table, drawn with NumPy."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, UInt8
@@ -72,33 +73,32 @@ class Canvas:
         self._picture += share * (_rgb(color) - self._picture)
 
 
-def draw(
-    view: View,
-    scene: Scene,
-    state: State,
-    *,
-    goal: Float[np.ndarray, "2"],
-    tolerance: float,
-) -> Picture:
+class Goal(NamedTuple):
+    """Where a disk is wanted."""
+
+    place: Float[np.ndarray, "2"]  # m
+    target: int  # index of that disk
+    tolerance: float  # distance that counts as reached, m
+
+
+def draw(view: View, scene: Scene, state: State, goal: Goal) -> Picture:
     """Return a picture of the disks, the pusher and the goal.
 
     Args:
         view: what the picture shows.
         scene: has the radii.
         state: poses to draw.
-        goal: of the target disk, the last one, m.
-        tolerance: distance from the goal that counts as reached, m.
+        goal: of the target disk.
     """
     canvas, radius = Canvas(view), np.asarray(scene.radius, np.float64)
     place, angle = np.asarray(state.position), np.asarray(state.angle)
-    last = len(radius) - 1
-    canvas.ring(goal, radius[last], TARGET)
+    canvas.ring(goal.place, radius[goal.target], TARGET)
     for disk, size in enumerate(radius):
-        color = {0: PUSHED, last: MOVED}.get(disk, OTHER)
+        color = {0: PUSHED, goal.target: MOVED}.get(disk, OTHER)
         canvas.disk(place[disk], size, color)
         turned = np.array([np.cos(angle[disk]), np.sin(angle[disk])])
         canvas.line(place[disk], place[disk] + _TICK * size * turned, PAPER)
-    canvas.disk(goal, tolerance, TARGET)
+    canvas.disk(goal.place, goal.tolerance, TARGET)
     canvas.disk(np.asarray(state.pusher_position), float(scene.pusher_radius), INK)
     return canvas.picture
 

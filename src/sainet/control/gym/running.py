@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.control.episode import MOST_TROUBLES, checked
-from sainet.control.gym.raster import Picture, View, draw
+from sainet.control.gym.raster import Goal, Picture, View, draw
 from sainet.control.gym.task import Observation, observation_of
 from sainet.control.record import poses_of
 from sainet.control.trial import Trial
@@ -39,7 +39,7 @@ class RunningTrial:
     @property
     def observation(self) -> Observation:
         """The poses measured last and the goal."""
-        return observation_of(self.pose, self.goal)
+        return observation_of(self.pose, self.goal, self.trial.task.moved)
 
     @property
     def is_stuck(self) -> bool:
@@ -68,7 +68,6 @@ class RunningTrial:
 
     def picture(self, tolerance: float) -> Picture:
         """Return a picture of the true poses and the goal with its tolerance (m)."""
-        robot = self.trial.robot
-        return draw(
-            self.view, robot.scene, robot.truth, goal=self.goal, tolerance=tolerance
-        )
+        robot, target = self.trial.robot, self.trial.task.moved
+        goal = Goal(self.goal, target, tolerance)
+        return draw(self.view, robot.scene, robot.truth, goal)

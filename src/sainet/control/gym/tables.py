@@ -26,6 +26,7 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.pushes import Push
 from sainet.scenes.scene import FrictionField, Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest
+from sainet.tasks.obstacles import Way, draw_obstacles
 from sainet.tasks.push_to_goal import draw_goal
 from sainet.worlds.noise import (
     FRICTION_FEATURES,
@@ -84,24 +85,30 @@ class Tables:
         trials: Int[np.ndarray, " row"],
     ) -> None:
         """Begin a trial on each of some tables, and measure their poses."""
-        row = in_a_row(np.asarray(self._scene.radius))
-        start = np.concatenate([row.position, row.angle[:, None]], axis=-1)
-        last, radius = np.asarray(row.position)[-1], float(self._scene.radius[-1])
         for table, seed, trial in zip(rows, seeds, trials, strict=True):
-            rng = robot_generator(int(seed), int(trial))
-            self.friction[table] = draw_friction(rng)
-            for name, values in friction_features(rng, 1, self._noise).items():
-                self.field[name][table] = values[0]
-            self.goal[table] = draw_goal(
-                self.config.goals,
-                int(seed),
-                int(trial),
-                disk=last,
-                axis=0.0,
-                radius=radius,
-            )
-        self.pose[rows] = start
+            self._begin_one(int(table), int(seed), int(trial))
         self.measured[rows] = self._world.capture(self.pose[rows][:, None])[:, 0]
+
+    def _begin_one(self, table: int, seed: int, trial: int) -> None:
+        rng = robot_generator(seed, trial)
+        self.friction[table] = draw_friction(rng)
+        for name, values in friction_features(rng, 1, self._noise).items():
+            self.field[name][table] = values[0]
+        place, target, radius = self._row, self.config.target, self._scene.radius
+        goal = draw_goal(
+            self.config.goals,
+            seed,
+            trial,
+            disk=place[target],
+            axis=0.0,
+            radius=float(radius[target]),
+        )
+        if aside := self.config.obstacles:
+            row, way = place[:-aside], Way(target, goal)
+            others = draw_obstacles(seed, trial, way, row, np.asarray(radius))
+            place = np.concatenate([row, others])
+        self.goal[table] = goal
+        self.pose[table] = np.pad(place, ((0, 0), (0, 1)))  # all angles are zero
 
     def push(self, push: Push) -> Bool[np.ndarray, " table"]:
         """Push on every table and measure; return which pushes had a trouble."""
@@ -123,6 +130,11 @@ class Tables:
     def _scene(self) -> Scene:
         """One scene with the true masses and radii."""
         return scene_of(MASS, RADIUS, self.config.disks, 0.0)
+
+    @cached_property
+    def _row(self) -> Float[np.ndarray, "disk 2"]:
+        """Where the disks are before obstacles leave the row (m)."""
+        return np.asarray(in_a_row(np.asarray(self._scene.radius)).position)
 
     @cached_property
     def _noise(self) -> NoiseConfig:

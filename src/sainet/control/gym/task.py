@@ -38,7 +38,7 @@ class PushDisksTask:
     @property
     def target(self) -> int:
         """The index of the target disk."""
-        return self.scene.body_count - 1
+        return self.config.target
 
     @property
     def tolerance(self) -> float:
@@ -84,11 +84,19 @@ class PushDisksTask:
 
 
 def observation_of(
-    pose: Float[np.ndarray, "*env disk 3"], goal: Float[np.ndarray, "*env 2"]
+    pose: Float[np.ndarray, "*env disk 3"],
+    goal: Float[np.ndarray, "*env 2"],
+    target: int,
 ) -> Observation:
-    """Return an observation of measured poses; its arrays are new."""
+    """Return an observation of measured poses; its arrays are new.
+
+    Args:
+        pose: of each disk, m and rad.
+        goal: of the target disk, m.
+        target: the index of that disk.
+    """
     return Observation(
         observation=np.array(pose, np.float32).reshape(*pose.shape[:-2], -1),
-        achieved_goal=np.array(pose[..., -1, :2], np.float32),
+        achieved_goal=np.array(pose[..., target, :2], np.float32),
         desired_goal=np.array(goal, np.float32),
     )

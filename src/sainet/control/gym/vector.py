@@ -120,7 +120,7 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
         kept = is_on_table(self._tables.measured)
         self._pose = np.where(kept[:, None, None], self._tables.measured, self._pose)
         self._begin(again)
-        away = distances(self._pose[:, -1, :2], self._tables.goal)
+        away = distances(self._pose[:, self.task.target, :2], self._tables.goal)
         terminated = (away <= self.task.tolerance) & kept & ~again
         ended = (self._pushes >= self.config.pushes) | ~kept
         ended |= self._troubles >= MOST_TROUBLES
@@ -140,7 +140,7 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
 
     @property
     def _observation(self) -> Observation:
-        return observation_of(self._pose, self._tables.goal)
+        return observation_of(self._pose, self._tables.goal, self.task.target)
 
     def _reward(self, distance: Float[np.ndarray, "*env"]) -> Float[np.ndarray, "*env"]:
         return rewards(distance, tolerance=self.task.tolerance, kind=self.config.reward)
@@ -156,7 +156,8 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
 
     def _infos(self) -> _Infos:
         """Return success and distance of the true poses, each with its mask."""
-        away = distances(self._tables.pose[:, -1, :2], self._tables.goal)
+        place = self._tables.pose[:, self.task.target, :2]
+        away = distances(place, self._tables.goal)
         every = np.ones(self.num_envs, bool)
         return {
             "is_success": away <= self.task.success_radius,
