@@ -1,7 +1,7 @@
 """Settings of control trials and collecting sessions, free of JAX."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from sainet.planning import PLANNERS
@@ -101,6 +101,16 @@ class ControlConfig(RobotConfig):
         require(0 < stop <= 1, "stopping_tolerance", "above 0, at most 1", stop)
         late = self.deadline is None or 0 < self.deadline < math.inf
         require(late, "deadline", "positive and finite", self.deadline)
+
+    def with_disks(self, disks: int) -> "ControlConfig":
+        """Return the settings with another number of disks.
+
+        What so many disks do not have goes: obstacles, and the choice of a target disk.
+        """
+        obstacles = min(self.obstacles, disks - _LEAST_ROW)
+        is_there = self.moved is not None and self.moved <= disks - obstacles
+        moved = self.moved if is_there else None
+        return replace(self, disks=disks, obstacles=obstacles, moved=moved)
 
     @property
     def target(self) -> int:

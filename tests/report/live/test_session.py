@@ -187,6 +187,20 @@ def test_worlds_can_be_changed(session):
     assert len(moved.step.actual[0]) == 3
 
 
+def test_obstacles_and_the_target_disk_are_those_of_control(tmp_path):
+    disks = {"disks": 4, "moved": 2, "obstacles": 1}
+    session = Session(replace(CONFIG, out=tmp_path / "play", **disks))
+    assert session.view.target == 1
+    trial = make_trial(ControlConfig(seed=SEED, goals="hard", **disks), 0)
+    place = np.asarray(trial.robot.truth.position)
+    np.testing.assert_allclose(poses(session)[:, :2], 1000 * place, atol=0.006)
+    assert abs(place[3, 1]) > 0.02  # not in the row
+    (view,) = session.act(ChooseWorld("planar", "none", 3))
+    assert (len(view.disks), view.target) == (3, 1)
+    (view,) = session.act(ChooseWorld("planar", "none", 2))
+    assert (len(view.disks), view.target) == (2, 1)
+
+
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -195,6 +209,8 @@ def test_worlds_can_be_changed(session):
         {"disks": 1},
         {"disks": 5},
         {"world": "lab", "disks": 3},
+        {"obstacles": 1},
+        {"moved": 3},
         {"model": ()},
         {"model": ("in", "in")},
         {"seed": -1},

@@ -26,7 +26,12 @@ class PlayConfig:
     world: WorldName = "planar"
     """World that executes pushes: planar, bullet, or lab (the virtual lab)."""
     disks: int = 2
-    """Number of disks in a row; disk 1 is pushed, the last is the target disk."""
+    """Number of disks; disk 1 is pushed."""
+    moved: int | None = None
+    """Number of the target disk in the row. Default: the last one."""
+    obstacles: int = 0
+    """How many of the disks, the last ones, lie beside the way of the target disk
+    instead of in the row, at random."""
     noise_level: NoiseLevel = "default"
     """Scale of the world's noise; paper-like is three times the default."""
     goals: Goals = "hard"
@@ -64,6 +69,8 @@ class PlayConfig:
         config = ControlConfig(
             model=self.model[-1],
             disks=self.disks,
+            moved=self.moved,
+            obstacles=self.obstacles,
             noise_level=self.noise_level,
             goals=self.goals,
             seed=self.seed,

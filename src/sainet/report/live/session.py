@@ -72,7 +72,7 @@ class Session:
         self._goals: str = self._control.goals
         self._properties: Properties | None = None
         self._episode = Episode()
-        self._use(self._new_trial(self._control, self._index))
+        self._use(_new_trial(self._control, None, self._index))
 
     def predict(self, aim: Aim) -> Ghosts:
         """Return what the models predict for a push."""
@@ -215,16 +215,19 @@ class Session:
         self._control = control
 
     def _choose_world(self, message: ChooseWorld) -> None:
-        control = replace(self._control, disks=message.disks, noise_level=message.noise)
+        control = self._control.with_disks(message.disks)
+        control = replace(control, noise_level=message.noise)
         self._restart(in_world(control, message.world))
 
     def _restart(self, control: ControlConfig) -> None:
         """Start an episode with the disks in a row and another goal."""
-        if control.disks != self._control.disks or control.robot != self._control.robot:
-            self._properties = None
-        trial = self._new_trial(control, self._index + 1)
+        now = self._control
+        stay = (control.disks, control.robot) == (now.disks, now.robot)
+        properties = self._properties if stay else None
+        trial = _new_trial(control, properties, self._index + 1)
         self._workshop.prepare(control)
         self._close()
+        self._properties = properties
         self._control, self._index = control, self._index + 1
         self._goals = control.goals
         self._use(trial)
@@ -235,10 +238,10 @@ class Session:
             raise BadMessage("The virtual lab's properties are hidden.")
         if {len(message.mass_kg), len(message.radius_mm)} != {disks}:
             raise BadMessage(f"Properties are not those of {disks} disks.")
+        properties = Properties.of(message)
+        changed = _new_trial(self._control, properties, self._index + 1)
         self._close()
-        self._properties = Properties.of(message)
-        self._index += 1
-        changed = self._new_trial(self._control, self._index)
+        self._properties, self._index = properties, self._index + 1
         apart = moved_apart(changed.robot.scene, trial.robot.truth)
         changed.robot.arrange(apart)
         self._use(changed)
@@ -274,10 +277,6 @@ class Session:
         task = replace(self.trial.task, goal=goal)
         self.trial = self.trial._replace(task=task)
 
-    def _new_trial(self, control: ControlConfig, index: int) -> Trial:
-        robot = make_world(control, self._properties, index)
-        return with_goal(control, index, robot)
-
     def _doubts(self, moment: Moment, push: Push) -> list[str]:
         gap = check_observation(moment.scene, moment.observed)
         return list(doubts(self._model.dynamics, gap, (push,)))
@@ -285,6 +284,12 @@ class Session:
     @property
     def _model(self) -> Model:
         return self.predictor.models[self._control.model]
+
+
+def _new_trial(
+    control: ControlConfig, properties: Properties | None, index: int
+) -> Trial:
+    return with_goal(control, index, make_world(control, properties, index))
 
 
 def _loaded(name: str) -> Model:

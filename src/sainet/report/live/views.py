@@ -33,6 +33,7 @@ class View(msgspec.Struct, tag="view", kw_only=True):
     noise: NoiseLevel
     model: str  # that plans
     disks: list[DiskView]
+    target: int  # index of the target disk
     goal_mm: list[float]
     tolerance_mm: float
     distance_mm: float | None  # of the target disk from the goal
@@ -109,6 +110,7 @@ def view_of(
             DiskView(round(mass, 3), round(1000 * radius, 2), pose)
             for mass, radius, pose in disks
         ],
+        target=task.moved,
         goal_mm=[round(1000 * x, 2) for x in task.goal.tolist()],
         tolerance_mm=1000 * task.tolerance * radius[task.moved],
         distance_mm=1000 * float(task.distance(truth)),

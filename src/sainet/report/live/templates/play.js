@@ -94,12 +94,12 @@ class Play {
   }
 
   describe() {
-    const { disks, distance_mm: distance, is_solved: isSolved, pushes, tolerance_mm: tolerance } = this.view;
+    const { target, distance_mm: distance, is_solved: isSolved, pushes, tolerance_mm: tolerance } = this.view;
     const count = `${pushes} push${pushes === 1 ? "" : "es"}`;
     const away = distance === null ? "nowhere" : `${distance.toFixed(1)} mm from its goal`;
     byId("outcome").textContent = isSolved
-      ? `Disk ${disks.length} is at its goal after ${count}.`
-      : `After ${count}, disk ${disks.length} is ${away} (tolerance ${tolerance.toFixed(1)} mm).`;
+      ? `Disk ${target + 1} is at its goal after ${count}.`
+      : `After ${count}, disk ${target + 1} is ${away} (tolerance ${tolerance.toFixed(1)} mm).`;
   }
 
   setGhosts(ghosts) {

@@ -67,9 +67,8 @@ export class Table {
     const { disks, ghosts } = this.layers;
     disks.replaceChildren();
     ghosts.replaceChildren();
-    const last = this.view.disks.length - 1;
     this.view.disks.forEach((disk, index) => {
-      const role = index === 0 ? "pushed" : index === last ? "moved" : "other";
+      const role = index === 0 ? "pushed" : index === this.view.target ? "moved" : "other";
       const group = make("g", {
         id: `disk-${index + 1}`, class: `disk ${role}`, tabindex: 0, role: "button",
         "aria-roledescription": "disk that can be dragged", "aria-describedby": "keys",
@@ -116,7 +115,7 @@ export class Table {
     // The number stays upright.
     group.querySelector(".number").setAttribute("transform", `rotate(${pose[2]})`);
     const place = `x ${pose[0].toFixed(0)} mm, y ${pose[1].toFixed(0)} mm`;
-    const task = index === 0 ? ", the robot pushes it" : index === this.view.disks.length - 1 ? ", it has the goal" : "";
+    const task = index === 0 ? ", the robot pushes it" : index === this.view.target ? ", it has the goal" : "";
     group.setAttribute("aria-label", `Disk ${index + 1}${task}; ${place}`);
   }
 
@@ -132,12 +131,12 @@ export class Table {
   }
 
   placeGoal([x, y]) {
-    const target = this.view.disks[this.view.disks.length - 1];
+    const target = this.view.disks[this.view.target];
     this.goal.setAttribute("transform", `translate(${x} ${-y})`);
     this.goal.querySelector(".reach").setAttribute("r", target.radius_mm);
     this.goal.querySelector(".tolerance").setAttribute("r", this.view.tolerance_mm);
     this.goal.classList.toggle("reached", this.view.is_solved);
-    this.goal.setAttribute("aria-label", `Goal of disk ${this.view.disks.length}; x ${x.toFixed(0)} mm, y ${y.toFixed(0)} mm`);
+    this.goal.setAttribute("aria-label", `Goal of disk ${this.view.target + 1}; x ${x.toFixed(0)} mm, y ${y.toFixed(0)} mm`);
   }
 
   drawPusher() {
