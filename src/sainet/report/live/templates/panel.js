@@ -108,7 +108,10 @@ export class Readout {
       while (row.cells.length > 1) row.deleteCell(-1);
       ghost.difference_mm.forEach((mm, index) => {
         const cell = row.insertCell();
-        cell.textContent = isReference ? "–" : `${number(mm)} mm, ${number(ghost.difference_deg[index])}°`;
+        // A line may break between the two.
+        cell.append(...(isReference ? ["–"] : [
+          whole(`${number(mm)} mm,`), " ", whole(`${number(ghost.difference_deg[index])}°`),
+        ]));
       });
     });
     const notes = [...ghosts.warnings];
@@ -134,6 +137,10 @@ export class Readout {
     });
     byId("doubts").textContent = "";
   }
+}
+
+function whole(text) {
+  return Object.assign(document.createElement("span"), { textContent: text });
 }
 
 function number(value) {
