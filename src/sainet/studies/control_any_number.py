@@ -26,19 +26,24 @@ OBSTACLES = "2 disks and 2 obstacles, hard"
 
 
 def _plan(scope: Scope) -> Plan:
-    """Return the trials: half as many with more than two disks."""
+    """Return the trials.
+
+    With three disks there are half as many as with two; with another target disk and
+    with obstacles a quarter.
+    """
     return Plan(Join(tuple(_trials(*TRIALS[scope.scale]))))
 
 
 def _trials(count: int, pushes: int) -> Iterator[RunTrials]:
     two = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
-    more = replace(two, disks=3, trials=max(count // 2, 1))
+    three = replace(two, disks=3, trials=max(count // 2, 1))
+    few = replace(three, trials=max(count // 4, 1))
     for label, config in (
         (EASY, two),
         (HARD, replace(two, goals="hard")),
-        (THREE, more),
-        (SECOND, replace(more, moved=2)),
-        (OBSTACLES, replace(more, disks=4, obstacles=2, goals="hard")),
+        (THREE, three),
+        (SECOND, replace(few, moved=2)),
+        (OBSTACLES, replace(few, disks=4, obstacles=2, goals="hard")),
     ):
         factors = {name: getattr(config, name) for name in _FACTORS}
         factors["target"] = config.target + 1
