@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, get_args
 
 from sainet.control.config import ControlConfig, GivenProperties, Goals
-from sainet.control.worlds import WorldName, in_world
+from sainet.control.worlds import TableConfig
 from sainet.robots import Surface
 from sainet.runs.errors import require_one_of
-from sainet.worlds.noise import NoiseLevel
 
 if TYPE_CHECKING:
     from sainet.control.gym.actions import ActionKind
@@ -16,11 +15,9 @@ RewardKind = Literal["sparse", "dense"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class PushDisksConfig:
+class PushDisksConfig(TableConfig):
     """Options of `sainet/PushDisks-v0`; defaults as in `sainet control`."""
 
-    world: WorldName = "planar"
-    """World: planar or bullet (simulated), or lab (a virtual lab, simulated in 3-D)."""
     goals: Goals = "easy"
     """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
     either side)."""
@@ -30,15 +27,6 @@ class PushDisksConfig:
     reward: RewardKind = "sparse"
     """Reward: sparse (0 at the goal, else -1) or dense (minus the measured distance of
     the target disk from the goal, m)."""
-    noise_level: NoiseLevel = "default"
-    """Scale of the noise of planar and bullet: none, default or paper-like."""
-    disks: int = 2
-    """Number of disks; disk 1 is pushed."""
-    moved: int | None = None
-    """Number of the target disk in the row. Default: the last one."""
-    obstacles: int = 0
-    """How many of the disks, the last ones, lie beside the way of the target disk
-    instead of in the row, at random."""
     pushes: int = 60
     """Number of pushes after which an episode is truncated."""
     lab: int = 0
@@ -54,7 +42,6 @@ class PushDisksConfig:
         Raises:
             BadSetting: an option has a value that cannot be used.
         """
-        require_one_of("world", self.world, get_args(WorldName))
         require_one_of("actions", self.actions, ("grid", "continuous"))
         require_one_of("reward", self.reward, get_args(RewardKind))
         self.control()
@@ -62,10 +49,6 @@ class PushDisksConfig:
     def control(self, seed: int = 0) -> ControlConfig:
         """Return the settings of `sainet control` with the same trials."""
         usual = ControlConfig(
-            disks=self.disks,
-            moved=self.moved,
-            obstacles=self.obstacles,
-            noise_level=self.noise_level,
             lab=self.lab,
             surface=self.surface,
             goals=self.goals,
@@ -73,4 +56,4 @@ class PushDisksConfig:
             given_properties=self.given_properties,
             seed=seed,
         )
-        return in_world(usual, self.world)
+        return self.on_table(usual)

@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
 
 from sainet.control.config import ControlConfig, Goals
-from sainet.control.worlds import WorldName, in_world
-from sainet.runs.errors import require, require_one_of
+from sainet.control.worlds import TableConfig
+from sainet.runs.errors import require
 from sainet.scenes.quantities import LARGEST_COUNT, require_count
-from sainet.worlds.noise import NoiseLevel
 
 DISK_COUNTS = (2, 3, 4)
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
@@ -17,23 +15,12 @@ _MOST_MODELS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlayConfig:
+class PlayConfig(TableConfig):
     """Address of the page, and the scene that it starts with."""
 
     model: tuple[str, ...] = ("physics", "in", "sain")
     """Models whose predictions the page shows, or folders of trained networks; the last
     plans at first."""
-    world: WorldName = "planar"
-    """World that executes pushes: planar, bullet, or lab (the virtual lab)."""
-    disks: int = 2
-    """Number of disks; disk 1 is pushed."""
-    moved: int | None = None
-    """Number of the target disk in the row. Default: the last one."""
-    obstacles: int = 0
-    """How many of the disks, the last ones, lie beside the way of the target disk
-    instead of in the row, at random."""
-    noise_level: NoiseLevel = "default"
-    """Scale of the world's noise; paper-like is three times the default."""
     goals: Goals = "hard"
     """Goals that are drawn: easy (within 30 degrees of the disks' axis) or hard (30 to
     60 degrees to either side)."""
@@ -53,7 +40,6 @@ class PlayConfig:
         """Check every setting."""
         few = 0 < len(set(self.model)) == len(self.model) <= _MOST_MODELS
         require(few, "model", f"1 to {_MOST_MODELS} different models", self.model)
-        require_one_of("world", self.world, get_args(WorldName))
         require_count("disks", self.disks, low=DISK_COUNTS[0], high=DISK_COUNTS[-1])
         require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
         require_count("port", self.port, low=0, high=_LARGEST_PORT)
@@ -66,16 +52,8 @@ class PlayConfig:
         Raises:
             BadSetting: the world does not have so many disks.
         """
-        config = ControlConfig(
-            model=self.model[-1],
-            disks=self.disks,
-            moved=self.moved,
-            obstacles=self.obstacles,
-            noise_level=self.noise_level,
-            goals=self.goals,
-            seed=self.seed,
-        )
-        return in_world(config, self.world)
+        usual = ControlConfig(model=self.model[-1], goals=self.goals, seed=self.seed)
+        return self.on_table(usual)
 
     def hosts(self, port: int) -> frozenset[str]:
         """Return the values that the header Host may have."""
