@@ -294,8 +294,12 @@ def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
     error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr
     assert "trained on" in error
     given = ("--model", "physics", out, "--data", pushes, "--force", "--json")
-    done = sainet("evaluate", *given)
+    page = tmp_path / "page.html"
+    done = sainet("evaluate", *given, "--page", page)
     assert "its 90 % regions hold" in done.stderr
+    assert "An ellipse is where its model expects" in page.read_text()
+    error = sainet("evaluate", *given, "--page", "page.pdf", status=2).stderr
+    assert "--page is page.pdf; it must be a file that ends in .html" in error
     found = json.loads(done.stdout.splitlines()[-1])["coverage"]
     assert {each["model"] for each in found} == {"gp"}
     error = sainet(*words, "--hold", 3, status=2).stderr

@@ -8,7 +8,7 @@ from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Comparison, Estimate, Factor, Row, Summary
 from sainet.models.identity import ModelId
-from sainet.report.episode_frames import Replay, Track
+from sainet.report.episode_frames import EndRegion, Replay, Track
 
 STEPS = 200
 TIME_STEP = 1 / 240  # s
@@ -21,6 +21,11 @@ _OFF = {
     "in": (0.8, 0.7, 2.0),
     "sain": (0.35, 0.25, 2.6),
 }
+REGION = EndRegion(
+    heading=0.4,
+    axes=np.array([[0.0012, 0.0005], [0.0009, 0.0004]]),
+    turn=np.radians([0.7, 0.5]),
+)
 
 
 def ramp():
@@ -58,7 +63,8 @@ def replay(title="Push 17 of the test set", models=tuple(_OFF)):
         off = 1e-3 * size * share * np.concatenate([np.cos(bend), np.sin(bend)], 1)
         both = np.stack([off, 0.7 * off[:, ::-1]], 1)
         angle = truth.angle + np.radians(turn) * share * np.array([1.0, -0.6])
-        tracks[name] = Track(truth.position + both, angle, truth.pusher)
+        region = REGION if name == "sain" else None
+        tracks[name] = Track(truth.position + both, angle, truth.pusher, region)
     return Replay(title, TIME_STEP, RADIUS, PUSHER_RADIUS, tracks)
 
 

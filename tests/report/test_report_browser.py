@@ -128,6 +128,17 @@ def test_scrubbing_moves_the_disks_and_the_read_out(still):
     assert row.text.split() == ["Physics", "3.80", "mm", "2.66", "mm"]
 
 
+def test_regions_are_drawn_in_the_lenses(still):
+    row = still.find_element("css selector", "#replay-0 .region")
+    assert row.text.split()[-2:] == ["±0.7°", "±0.5°"]
+    scrub_to(still, 0)
+    shown = pixels(still, "lens-1")
+    player_index = list(samples.replay().tracks).index("sain")
+    element(still, f"show-{player_index}").click()  # its region goes with the model
+    without = pixels(still, "lens-1")
+    assert without != shown
+
+
 def test_a_model_can_be_hidden_and_shown_again(still):
     scrub_to(still, 150)
     shown = pixels(still)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.report import WRITERS
-from sainet.runs.errors import BadInput, require_one_of
+from sainet.runs.errors import BadInput, require, require_one_of
 from sainet.runs.shards import Shard
 
 if TYPE_CHECKING:
@@ -38,6 +38,9 @@ class Evaluate:
     """Skip data and engine compatibility checks."""
     table: Path | None = None
     """File for the table: .md, .html, .tex or .csv. Default: none."""
+    page: Path | None = None
+    """Page to write: the table, the verdict, errors over time, and two pushes that
+    play, in one .html file. Default: none."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     out: Path | None = None
@@ -53,6 +56,9 @@ class Evaluate:
         """Evaluate the models and print the table."""
         if self.table is not None:
             require_one_of("table", self.table.suffix, WRITERS)
+        if self.page is not None:
+            wanted = "a file that ends in .html"
+            require(self.page.suffix.lower() == ".html", "page", wanted, self.page)
         use_devices(self.devices)
         from sainet.datasets.store import open_part
         from sainet.evaluation.as_json import to_json_object
@@ -83,6 +89,13 @@ class Evaluate:
             self.output.say(sentence)
         if self.table is not None:
             write_table(arrange(summary), self.table)
+        if self.page is not None:
+            from sainet.report.pages.evaluation import write_evaluation
+
+            names = " ".join(model.name for model in models)
+            command = f"sainet evaluate --model {names} --data {self.data}"
+            write_evaluation(models, store, measured, self.page, command=command)
+            self.output.say(f"Open {self.page} in a browser.")
         return to_json_object(summary) | to_json(covered)
 
     def _measure(self, models: "list[Model]", store: "Store") -> "Measurements":

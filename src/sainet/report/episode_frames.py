@@ -13,12 +13,22 @@ from sainet.report.palette import style_of
 
 
 @dataclass(frozen=True, eq=False)
+class EndRegion:
+    """Where the end of a push is expected with a probability of 90 %."""
+
+    heading: float  # rad, of the first axis of the ellipses
+    axes: Float[np.ndarray, "body 2"]  # m, half axes about the predicted end
+    turn: Float[np.ndarray, " body"]  # rad, half width of the interval of the angle
+
+
+@dataclass(frozen=True, eq=False)
 class Track:
     """The motion of one push from its initial state; NaN where not observed."""
 
     position: Float[np.ndarray, "time body 2"]  # m, time is the steps plus one
     angle: Float[np.ndarray, "time body"]  # rad, counter-clockwise
     pusher: Float[np.ndarray, "time 2"]  # m
+    region: EndRegion | None = None  # of the end; None where it is not known
 
     def __post_init__(self) -> None:
         """Check that the three fields have the same steps and bodies."""
@@ -58,6 +68,11 @@ class Replay:
     def reference(self) -> Track:
         """The track with which the others are compared."""
         return next(iter(self.tracks.values()))
+
+    @property
+    def has_regions(self) -> bool:
+        """Whether a model states where the push ends."""
+        return any(track.region for track in self.tracks.values())
 
     def errors_mm(self, model: str) -> Float[np.ndarray, "time body"]:
         """Return the position errors of a model's disks (mm)."""

@@ -1,32 +1,29 @@
 """The whole method, small: simulate, train, compare, look."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import jax
 import numpy as np
-from jaxtyping import Float
 
 from sainet.control.config import ControlConfig, Goals
 from sainet.control.record import EpisodeRecord
 from sainet.control.trials import run_trials
-from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.store import Store
 from sainet.evaluation.evaluate import PAPER_STEPS
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import PAPER
-from sainet.models.dynamics import predict
 from sainet.models.model import Model
-from sainet.report.episode_frames import Replay, Track, outcome
+from sainet.report.episode_frames import Replay, outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report
+from sainet.report.replays import build_replay, error_curves
 from sainet.runs.documents import read_json, write_document
 from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST
-from sainet.scenes.state import State, Trajectory, pack_motion
 from sainet.studies import DemoConfig
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.runner import Runner
@@ -170,68 +167,3 @@ def _median_replay(
     return build_replay(
         models, test, push, title=f"Test push {push + 1}", steps=PAPER_STEPS
     )
-
-
-def build_replay(
-    models: Sequence[Model], store: Store, push: int, *, title: str, steps: int
-) -> Replay:
-    """Return one push as it was and as each model predicts it.
-
-    Args:
-        models: in the order of the legend.
-        store: holds the push.
-        push: its index.
-        title: of the replay.
-        steps: how many to show.
-    """
-    arrays = store.read(slice(push, push + 1))
-    batch = to_batch(arrays, store.info, steps=steps)
-    pusher = _with_start(
-        batch.initial.pusher_position, arrays["truth_pusher"][:, :steps]
-    )
-    motion = _with_start(_pose(batch.initial), np.asarray(batch.truth[..., :3]))
-    tracks = {"truth": Track(motion[..., :2], motion[..., 2], pusher)}
-    for model in models:
-        tracks[model.name] = _track(_predict(model, batch), batch.initial)
-    return Replay(
-        title=title,
-        time_step=store.info.time_step,
-        radius=tuple(float(r) for r in arrays["radius"][0]),
-        pusher_radius=float(arrays["pusher_radius"][0]),
-        tracks=tracks,
-    )
-
-
-def error_curves(
-    models: Sequence[Model], store: Store, *, steps: int, pushes: int
-) -> dict[str, Float[np.ndarray, "time body"]]:
-    """Return each model's mean position error (mm) over the time of a push."""
-    arrays = store.read(slice(0, min(pushes, store.info.pushes)))
-    batch = to_batch(arrays, store.info, steps=steps)
-    true = np.asarray(batch.truth[..., :2])
-    curves = {}
-    for model in models:
-        predicted = np.asarray(_predict(model, batch).states.position)
-        error = 1000 * np.linalg.norm(predicted - true, axis=-1)
-        curves[model.name] = error.mean(axis=0)
-    return curves
-
-
-def _predict(model: Model, batch: PushBatch) -> Trajectory:
-    return predict(model.dynamics, batch.scene, batch.initial, batch.controls)
-
-
-def _track(trajectory: Trajectory, initial: State) -> Track:
-    states = trajectory.states
-    motion = _with_start(_pose(initial), _pose(states))
-    pusher = _with_start(initial.pusher_position, np.asarray(states.pusher_position))
-    return Track(motion[..., :2], motion[..., 2], pusher)
-
-
-def _pose(state: State) -> np.ndarray:
-    return np.asarray(pack_motion(state)[..., :3])
-
-
-def _with_start(start: object, rest: np.ndarray) -> np.ndarray:
-    """Put the state before the push in front of what follows, of a single push."""
-    return np.concatenate([np.asarray(start), rest[0]], axis=0)

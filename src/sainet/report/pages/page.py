@@ -13,7 +13,14 @@ from markupsafe import Markup
 from sainet.control.record import EpisodeRecord
 from sainet.evaluation.summary import Summary
 from sainet.report.arrange import arrange
-from sainet.report.episode_frames import Replay, Track, episode_data, numbers, plane
+from sainet.report.episode_frames import (
+    EndRegion,
+    Replay,
+    Track,
+    episode_data,
+    numbers,
+    plane,
+)
 from sainet.report.pages import read, render
 from sainet.report.palette import css_variables, styles_of
 from sainet.report.table import Table
@@ -26,6 +33,8 @@ _SCRIPTS = ("motion.js", "draw.js", "transport.js", "replay.js", "episode.js")
 _CONCLUSIONS = 1  # sentences at the top
 _DECIMALS_MM = 3
 _DECIMALS_RAD = 5
+_SPEEDS = (0.1, 0.25, 1)  # that a reader chooses from, slow ones first
+_LONGEST = 10  # seconds that a push plays, at such a speed
 _PIXELS_PER_POINT = 1.4
 # Elements and attributes of figures drawn by this package.
 _SHAPES = ("svg", "defs", "style", "g", "path", "use", "text", "clipPath", "rect")
@@ -95,6 +104,7 @@ def to_page(report: Report) -> str:
         report=report,
         paragraphs=[text for text in re.split(r"\n\s*\n", report.summary) if text],
         replays=[replay_data(replay) for replay in report.replays],
+        has_regions=any(replay.has_regions for replay in report.replays),
         episodes=[episode_data(record) for record in report.episodes],
         conclusions=_conclusions(report, table),
         table=Markup(to_html(table)) if table else "",
@@ -137,6 +147,7 @@ def replay_data(replay: Replay) -> dict[str, object]:
         "title": replay.title,
         "timeStep": replay.time_step,
         "steps": len(reference.angle) - 1,
+        "speed": _speed(replay.time_step * (len(reference.angle) - 1)),
         "radius": [1e3 * radius for radius in replay.radius],
         "pusherRadius": 1e3 * replay.pusher_radius,
         "pusher": _plane(reference.pusher),
@@ -147,10 +158,16 @@ def replay_data(replay: Replay) -> dict[str, object]:
                 "dash": list(styles[name].dash),
                 "isTruth": track is reference,
                 "bodies": _bodies(track),
+                "region": _region(track.region) if track.region else None,
             }
             for name, track in replay.tracks.items()
         ],
     }
+
+
+def _speed(duration: float) -> float:
+    """Return how fast a push of some length (s) plays at first."""
+    return next((s for s in _SPEEDS[:-1] if duration / s <= _LONGEST), _SPEEDS[-1])
 
 
 def _bodies(track: Track) -> list[dict[str, list[float | None]]]:
@@ -159,6 +176,16 @@ def _bodies(track: Track) -> list[dict[str, list[float | None]]]:
         _plane(track.position[:, body]) | {"angle": numbers(angle[:, body])}
         for body in range(angle.shape[1])
     ]
+
+
+def _region(region: EndRegion) -> dict[str, object]:
+    axes = (1e3 * np.asarray(region.axes, float)).round(_DECIMALS_MM)
+    turn = np.degrees(np.asarray(region.turn, float))
+    return {
+        "heading": round(region.heading, _DECIMALS_RAD),
+        "axes": axes.tolist(),  # mm
+        "turn": turn.round(1).tolist(),  # degrees
+    }
 
 
 def _plane(position: np.ndarray) -> dict[str, list[float | None]]:

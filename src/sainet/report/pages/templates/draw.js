@@ -38,6 +38,19 @@ function drawDot(context, place, radius, color) {
   context.fill();
 }
 
+// Half axes in millimetres, the heading of the first one in radians.
+function drawEllipse(context, view, middle, axes, heading, color) {
+  const [along, across] = axes.map((length) => length * view.scale);
+  context.beginPath();
+  context.ellipse(...view.at(middle.x, middle.y), along, across, -heading, 0, 2 * Math.PI);
+  context.globalAlpha = 0.12;
+  context.fillStyle = color;
+  context.fill();
+  context.globalAlpha = 1;
+  strokeWith(context, color, 1);
+  context.stroke();
+}
+
 // A mark on the rim, so that rotation is visible.
 function drawMark(context, view, pose, radius, inner) {
   const ray = [Math.cos(pose.angle) * radius, Math.sin(pose.angle) * radius];

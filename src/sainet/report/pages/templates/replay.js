@@ -8,7 +8,7 @@ class Player extends Transport {
   prepare() {
     this.truth = this.data.tracks[0];
     this.shown = new Set(this.data.tracks.keys());
-    Object.assign(this, { speed: 0.1, factor: 5 });
+    Object.assign(this, { speed: this.data.speed, factor: 5 });
     this.lenses = [...this.root.querySelectorAll("[data-view=lens]")];
   }
 
@@ -69,6 +69,9 @@ class Player extends Transport {
     for (const track of [this.truth, ...tracks]) {
       const { x, y } = track.bodies[body];
       x.forEach((value, step) => bounds.add(value ?? NaN, y[step] ?? NaN, 0.25));
+      if (track.region) {
+        bounds.add(x.at(-1), y.at(-1), Math.max(...track.region.axes[body]));
+      }
     }
     return bounds;
   }
@@ -113,6 +116,10 @@ class Player extends Transport {
     drawGrid(context, canvas, view, this.spacings[body], this.ink);
     this.eachShown((track, look) => {
       const placeAt = (step) => poseAt(track, body, step);
+      if (track.region) {
+        const { heading, axes } = track.region;
+        drawEllipse(context, view, placeAt(this.data.steps), axes[body], heading, look.color);
+      }
       const { x, y } = placeAt(this.step);
       if (!Number.isFinite(x + y)) return;
       drawTrail(context, view, placeAt, this.step, look.color, 2);
