@@ -299,7 +299,8 @@ def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
     assert "its 90 % regions hold" in done.stderr
     assert "An ellipse is where its model expects" in page.read_text()
     error = sainet("evaluate", *given, "--page", "page.pdf", status=2).stderr
-    assert "--page is page.pdf; it must be a file that ends in .html" in error
+    assert "--page" in error
+    assert ".html" in error
     found = json.loads(done.stdout.splitlines()[-1])["coverage"]
     assert {each["model"] for each in found} == {"gp"}
     error = sainet(*words, "--hold", 3, status=2).stderr

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.report import WRITERS
-from sainet.runs.errors import BadInput, require, require_one_of
+from sainet.runs.errors import BadInput, require_one_of
 from sainet.runs.shards import Shard
 
 if TYPE_CHECKING:
@@ -57,8 +57,7 @@ class Evaluate:
         if self.table is not None:
             require_one_of("table", self.table.suffix, WRITERS)
         if self.page is not None:
-            wanted = "a file that ends in .html"
-            require(self.page.suffix.lower() == ".html", "page", wanted, self.page)
+            require_one_of("page", self.page.suffix, (".html",))
         use_devices(self.devices)
         from sainet.datasets.store import open_part
         from sainet.evaluation.as_json import to_json_object
@@ -89,14 +88,20 @@ class Evaluate:
             self.output.say(sentence)
         if self.table is not None:
             write_table(arrange(summary), self.table)
-        if self.page is not None:
-            from sainet.report.pages.evaluation import write_evaluation
-
-            names = " ".join(model.name for model in models)
-            command = f"sainet evaluate --model {names} --data {self.data}"
-            write_evaluation(models, store, measured, self.page, command=command)
-            self.output.say(f"Open {self.page} in a browser.")
+        self._write_page(models, store, measured)
         return to_json_object(summary) | to_json(covered)
+
+    def _write_page(
+        self, models: "list[Model]", store: "Store", measured: "Measurements"
+    ) -> None:
+        if self.page is None:
+            return
+        from sainet.report.pages.evaluation import write_evaluation
+
+        names = " ".join(model.name for model in models)
+        command = f"sainet evaluate --model {names} --data {self.data}"
+        write_evaluation(models, store, measured, self.page, command=command)
+        self.output.say(f"Open {self.page} in a browser.")
 
     def _measure(self, models: "list[Model]", store: "Store") -> "Measurements":
         """Return the errors of all models, measured where that is missing."""
