@@ -29,7 +29,7 @@ def _plan(scope: Scope) -> Plan:
     """Return the trials.
 
     With three disks there are half as many as with two; with another target disk and
-    with obstacles a quarter.
+    with obstacles an eighth.
     """
     return Plan(Join(tuple(_trials(*TRIALS[scope.scale]))))
 
@@ -37,7 +37,7 @@ def _plan(scope: Scope) -> Plan:
 def _trials(count: int, pushes: int) -> Iterator[RunTrials]:
     two = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
     three = replace(two, disks=3, trials=max(count // 2, 1))
-    few = replace(three, trials=max(count // 4, 1))
+    few = replace(three, trials=max(count // 8, 1))
     for label, config in (
         (EASY, two),
         (HARD, replace(two, goals="hard")),
