@@ -24,6 +24,7 @@ import pytest
 from jaxtyping import install_import_hook
 
 import checks
+import lowering
 from support import REPOSITORY, require
 
 # The workers of a run and the commands that they start compile the same things; what
@@ -64,6 +65,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix  # of commands and workers
 # Annotated shapes and types of the package are checked while the tests run.
 checks.install()
+lowering.install()
 install_import_hook("sainet", "support.typechecker")
 
 
