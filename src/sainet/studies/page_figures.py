@@ -19,7 +19,11 @@ _ERRORS_OF = (
 _SUCCESS_OF = (
     ("Simulation, easy goals", "simulated-control", "easy, greedy"),
     ("Simulation, hard goals", "simulated-control", "hard, greedy"),
-    ("Simulation, three disks, easy goals", "control-any-number", "3 disks, easy"),
+    (
+        "Simulation, three disks, easy goals",
+        "simulated-control",
+        "easy, tree, three disks",
+    ),
     ("Virtual lab, easy goals", "lab-control", "easy"),
     ("Virtual lab, hard goals", "lab-control", "hard"),
     ("The same, larger weight of alignment", "lab-control", "hard, alignment 10"),
