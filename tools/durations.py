@@ -1,15 +1,18 @@
 """Fit the rates by which `sainet reproduce` tells beforehand how long it takes.
 
-    python tools/durations.py runs/whole-paper runs/recorded
+    python tools/durations.py runs/recorded runs/whole-paper [RUN ...]
 
-reads the durations of a finished `XLA_FLAGS= sainet reproduce --recorded runs/recorded`
-at the quick scale, and writes src/sainet/studies/durations.json. The variable is set to
-nothing so that everything is compiled as at the paper's scale.
+reads the durations in run folders of `XLA_FLAGS= sainet reproduce --recorded
+runs/recorded` at any scale, and writes src/sainet/studies/durations.json. Kinds of work
+that these folders do not have keep their rates. The variable is set to nothing so that
+the quick scale is compiled like the paper's.
 """
 
 import sys
 from collections import defaultdict
+from itertools import product
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from scipy.optimize import nnls
@@ -17,9 +20,9 @@ from scipy.optimize import nnls
 from sainet.runs.documents import write_document
 from sainet.runs.manifest import processor
 from sainet.runs.workers import core_count
-from sainet.studies import STUDIES, load_study
+from sainet.studies import STUDIES, Scale, load_study
 from sainet.studies.durations import Clock
-from sainet.studies.effort import RATES, Rate, Rates, effort
+from sainet.studies.effort import RATES, Rate, Rates, effort, measured_rates
 from sainet.studies.runner import all_steps
 from sainet.studies.study import STEPS, Scope, last_steps
 
@@ -34,16 +37,20 @@ def rate_of(measured: list[tuple[float, float]]) -> Rate:
     return Rate(*nnls(design, np.ones_like(seconds))[0].tolist())
 
 
-def main(out: str, recorded: str) -> None:
+def main(recorded: str, *runs: str) -> None:
     """Fit and write the rates."""
-    scope, clock = Scope("quick", Path(recorded)), Clock(Path(out) / STEPS)
-    plans = (load_study(name).plan(scope) for name in STUDIES)
     measured: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
-    for step in all_steps(last_steps(plans)).values():
-        if (took := clock.duration(step)) and took.has_ended:
-            measured[effort(step).kind].append((effort(step).size, took.seconds))
-    kinds = {kind: rate_of(pairs) for kind, pairs in sorted(measured.items())}
-    found = Rates(processor=processor(), cores=core_count(), kinds=kinds)
+    for run, scale in product(runs, get_args(Scale)):
+        scope, clock = Scope(scale, Path(recorded)), Clock(Path(run) / STEPS)
+        plans = (load_study(name).plan(scope) for name in STUDIES)
+        for step in all_steps(last_steps(plans)).values():
+            if (took := clock.duration(step)) and took.has_ended:
+                measured[effort(step).kind].append((effort(step).size, took.seconds))
+    kinds = {kind: rate_of(pairs) for kind, pairs in measured.items()}
+    kinds = measured_rates().kinds | kinds
+    found = Rates(
+        processor=processor(), cores=core_count(), kinds=dict(sorted(kinds.items()))
+    )
     write_document(TARGET, found)
 
 

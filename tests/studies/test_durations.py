@@ -4,12 +4,15 @@ from collections import Counter
 
 import pytest
 
+from sainet.control.config import ControlConfig
 from sainet.datasets.config import GenerateConfig
+from sainet.evaluation.measurements import Condition
 from sainet.runs.errors import BadInput
 from sainet.studies import STUDIES, durations, effort, load_study
 from sainet.studies.durations import DURATIONS, Clock, Duration, in_words
-from sainet.studies.effort import Rate, Rates, expected_seconds, measured_rates
+from sainet.studies.effort import Effort, Rate, Rates, expected_seconds, measured_rates
 from sainet.studies.lab_pushes import Collect
+from sainet.studies.paper_setup import physics
 from sainet.studies.runner import Runner, all_steps
 from sainet.studies.shares import unfinished
 from sainet.studies.simulated_control import RunTrials
@@ -175,6 +178,20 @@ def test_expected_seconds_grow_with_the_work_and_shrink_with_cores(monkeypatch):
         found = list(expected_seconds(steps).values())
         # A push is simulated once for the truth and once for each assumed engine.
         assert found == [(1 + 0.5 * size) * times for size in (10 * 2 * 2, 30 * 2 * 3)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "size"),
+    [
+        ({"pushes": 2}, 2 * 5 * 2 * 4),
+        ({"pushes": 60}, 2 * 5 * 20 * 4),  # no episode has as many as it may have
+        ({"pushes": 2, "disks": 3}, 2 * 5 * 2 * 9),
+    ],
+)
+def test_trials_take_longer_with_more_models_pushes_and_disks(changes, size):
+    config = ControlConfig(trials=5, **changes)
+    trials = RunTrials(physics(), config, Condition(label="some"))
+    assert effort.effort(trials) == Effort("RunTrials greedy", size)
 
 
 def test_the_paper_takes_longer_than_the_quick_scale():

@@ -21,6 +21,7 @@ from sainet.studies.paper_setup import WithBystander
 from sainet.studies.steps import Step
 
 RATES = "durations.json"
+_USUAL_PUSHES = 20  # of an episode that may have more
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,9 @@ def _(step: steps.Evaluate) -> Effort:
 
 @effort.register
 def _(step: simulated_control.RunTrials) -> Effort:
-    size = len(step.models) * step.config.trials
-    return Effort(f"RunTrials {step.config.planner}", size)
+    config = step.config
+    decisions = len(step.models) * config.trials * min(config.pushes, _USUAL_PUSHES)
+    return Effort(f"RunTrials {config.planner}", decisions * config.disks**2)
 
 
 @effort.register(WithBystander)
