@@ -23,24 +23,19 @@ import numpy as np
 import zarr
 
 ROOT = Path(__file__).resolve().parent.parent
-# Models, engines and arrays: the name that BASE may still use, and today's.
-RENAMED = {
-    f"{name}-calibrated": f"{name}-true"
-    for name in ("physics", "sain", "planar", "bullet")
-}
 # Keys of JSON that are not compared: times, and what BASE lacks.
 EXEMPT = {"median_decision_s"}
 _STORE = "--pushes 60 --chunk-size 30 --seed 7 --out"
 # Each command ends with its output folder; the later ones read earlier outputs.
 COMMANDS = (
     f"generate robot --disks 1 {_STORE} robot-1",
-    "generate robot --engine bullet --assumed-engine planar bullet planar-calibrated "
+    "generate robot --engine bullet --assumed-engine planar bullet planar-true "
     f"{_STORE} robot-2",
     f"generate robot --disks 5 --noise-level paper-like {_STORE} robot-5",
     f"generate direct-force --noise-level none {_STORE} force-2",
     f"generate direct-force --disks 3 --engine bullet {_STORE} force-3",
     "import mitpush-endpoints RECORDED --out recorded",
-    "evaluate --model physics physics-calibrated in sain sain-bullet --data robot-2",
+    "evaluate --model physics physics-true in sain sain-bullet --data robot-2",
     "evaluate --model physics in-stroke sain-stroke --data recorded",
     "identify --data robot-1 --out identified",
     "control --model sain --planner greedy --trials 2 --out greedy",
@@ -88,43 +83,34 @@ def _run(tree: Path, place: Path, words: list[str]) -> dict[str, Any]:
     """Return the values in a command's JSON and the hashes of the dataset it makes."""
     place.mkdir(exist_ok=True)
     environment = os.environ | {"PYTHONPATH": str(tree / "src")}
-    problem = ""
-    for spelling in (words, list(map(_renamed, words))):
-        line = (sys.executable, "-m", "sainet", *spelling, "--json", "--quiet")
-        done = subprocess.run(
-            line, check=False, cwd=place, env=environment, capture_output=True
-        )
-        if done.returncode == 0:
-            made = dict(_values(json.loads(done.stdout.splitlines()[-1])))
-            return made | _arrays(place / words[-1])
-        problem = problem or done.stderr.decode().strip()
-    return {str(tree): problem}
+    line = (sys.executable, "-m", "sainet", *words, "--json", "--quiet")
+    done = subprocess.run(
+        line, check=False, cwd=place, env=environment, capture_output=True
+    )
+    if done.returncode:
+        return {str(tree): done.stderr.decode().strip()}
+    made = dict(_values(json.loads(done.stdout.splitlines()[-1])))
+    return made | _arrays(place / words[-1])
 
 
 def _arrays(folder: Path) -> dict[str, str]:
     """Return the hash of each array of a dataset; the sign of a zero does not count."""
     return {
-        _renamed(name): sha256((np.asarray(array) + 0).tobytes()).hexdigest()
+        name: sha256((np.asarray(array) + 0).tobytes()).hexdigest()
         for store in folder.glob("*.zarr")
         for name, array in zarr.open_group(store, mode="r").arrays()
     }
 
 
 def _values(value: object, name: str = "") -> Iterator[tuple[str, object]]:
-    """Yield every plain value of JSON with its path, both with the names of now."""
+    """Yield every plain value of JSON with its path."""
     if isinstance(value, dict | list):
         items = value.items() if isinstance(value, dict) else enumerate(value)
         for key, each in items:
             if key not in EXEMPT:
-                yield from _values(each, f"{name}.{_renamed(str(key))}")
+                yield from _values(each, f"{name}.{key}")
     else:
-        yield name, _renamed(value) if isinstance(value, str) else value
-
-
-def _renamed(text: str) -> str:
-    for old, new in RENAMED.items():
-        text = text.replace(old, new)
-    return text
+        yield name, value
 
 
 def _first(one: dict[str, Any], other: dict[str, Any], *, tolerance: float) -> str:
