@@ -39,19 +39,18 @@ def rate_of(measured: list[tuple[float, float]]) -> Rate:
 
 def main(recorded: str, *runs: str) -> None:
     """Fit and write the rates."""
-    measured: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
+    pairs: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run, scale in product(runs, get_args(Scale)):
         scope, clock = Scope(scale, Path(recorded)), Clock(Path(run) / STEPS)
-        plans = (load_study(name).plan(scope) for name in STUDIES)
-        for step in all_steps(last_steps(plans)).values():
+        last = last_steps(load_study(name).plan(scope) for name in STUDIES)
+        for step in all_steps(last).values():
             if (took := clock.duration(step)) and took.has_ended:
-                measured[effort(step).kind].append((effort(step).size, took.seconds))
-    kinds = {kind: rate_of(pairs) for kind, pairs in measured.items()}
-    kinds = measured_rates().kinds | kinds
-    found = Rates(
-        processor=processor(), cores=core_count(), kinds=dict(sorted(kinds.items()))
+                pairs[effort(step).kind].append((effort(step).size, took.seconds))
+    new = {kind: rate_of(each) for kind, each in pairs.items()}
+    kinds = dict(sorted((measured_rates().kinds | new).items()))
+    write_document(
+        TARGET, Rates(processor=processor(), cores=core_count(), kinds=kinds)
     )
-    write_document(TARGET, found)
 
 
 if __name__ == "__main__":
