@@ -30,9 +30,10 @@ _MOST_WRONG = 0.5  # fraction of masses and radii
 class ControlConfig(RobotConfig):
     """Model, robot, goals and number of trials."""
 
-    model: str = "sain"
+    model: str = "sain-any"
     """Model that plans: physics, physics-true, a shipped network, or the run
-    folder of a trained network."""
+    folder of a trained network. The default is a network for any number of disks; the
+    paper's is sain."""
     goals: Goals = "easy"
     """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
     either side)."""
