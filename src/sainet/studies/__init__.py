@@ -35,6 +35,7 @@ STUDIES = {
     "robustness": "sainet.studies.robustness:STUDY",
     "simulated-control": "sainet.studies.simulated_control:STUDY",
     "control-any-number": "sainet.studies.control_any_number:STUDY",
+    "control-in-the-way": "sainet.studies.control_any_number:IN_THE_WAY",
     "adaptation": "sainet.studies.adaptation:STUDY",
     "expected-cost": "sainet.studies.expected_cost:STUDY",
     "engine-parity": "sainet.studies.engine_parity:STUDY",
