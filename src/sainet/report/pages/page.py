@@ -180,11 +180,10 @@ def _bodies(track: Track) -> list[dict[str, list[float | None]]]:
 
 def _region(region: EndRegion) -> dict[str, object]:
     axes = (1e3 * np.asarray(region.axes, float)).round(_DECIMALS_MM)
-    turn = np.degrees(np.asarray(region.turn, float))
     return {
         "heading": round(region.heading, _DECIMALS_RAD),
         "axes": axes.tolist(),  # mm
-        "turn": turn.round(1).tolist(),  # degrees
+        "turn": np.degrees(region.turn, dtype=float).round(1).tolist(),  # degrees
     }
 
 
