@@ -25,10 +25,10 @@ BLOCKED = "2 disks and 2 obstacles, hard"
 
 
 def _rows(scope: Scope) -> Plan:
-    """Return the trials of rows; with three disks half as many as with two."""
+    """Return the trials of rows; with three disks a quarter of those with two."""
     count, pushes = TRIALS[scope.scale]
     two = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
-    three = replace(two, disks=3, trials=max(count // 2, 1))
+    three = replace(two, disks=3, trials=max(count // 4, 1))
     hard = replace(two, goals="hard")
     trials = _trials(EASY, two), _trials(HARD, hard), _trials(THREE, three)
     return Plan(Join(trials))

@@ -16,11 +16,10 @@ _ERRORS_OF = (
     ("Table III: the robot, two disks", "robot-two-disks", ""),
     ("Table IV, in the virtual lab", "lab-prediction", "tests on ABS"),
 )
-_CONTROL = "simulated-control"
 _SUCCESS_OF = (
-    ("Simulation, easy goals", _CONTROL, "easy, greedy"),
-    ("Simulation, hard goals", _CONTROL, "hard, greedy"),
-    ("Simulation, three disks, easy goals", _CONTROL, "easy, tree, three disks"),
+    ("Simulation, easy goals", "simulated-control", "easy, greedy"),
+    ("Simulation, hard goals", "simulated-control", "hard, greedy"),
+    ("Simulation, three disks, easy goals", "control-any-number", "3 disks, easy"),
     ("Virtual lab, easy goals", "lab-control", "easy"),
     ("Virtual lab, hard goals", "lab-control", "hard"),
     ("The same, larger weight of alignment", "lab-control", "hard, alignment 10"),
