@@ -1,5 +1,7 @@
 """`sainet evaluate`."""
 
+import shlex
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -98,9 +100,10 @@ class Evaluate:
             return
         from sainet.report.pages.evaluation import write_evaluation
 
-        names = " ".join(model.name for model in models)
-        command = f"sainet evaluate --model {names} --data {self.data}"
-        write_evaluation(models, store, measured, self.page, command=command)
+        command = shlex.join(["sainet", *sys.argv[1:]])
+        write_evaluation(
+            models, store, measured, self.page, steps=self.steps, command=command
+        )
         self.output.say(f"Open {self.page} in a browser.")
 
     def _measure(self, models: "list[Model]", store: "Store") -> "Measurements":

@@ -59,13 +59,14 @@ def evaluate(
             seed=info.seed,
             pushes=hashes,
         )
-    pushes = StoredPushes(store, _limit(store, steps))
+    pushes = StoredPushes(store, steps_to_predict(store, steps))
     made = {m.name: partial(_errors, m, pushes, on_pushes) for m in models}
     errors = [parts.errors(k, make) if parts else make() for k, make in made.items()]
     return _measurements(models, pushes, errors)
 
 
-def _limit(store: Store, steps: int | None) -> int:
+def steps_to_predict(store: Store, steps: int | None) -> int:
+    """Return how many steps `evaluate` predicts, at most: see there."""
     if steps is None:
         recorded = store.info.is_recorded
         return store.info.steps if recorded else min(PAPER_STEPS, store.info.steps)

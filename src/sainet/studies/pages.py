@@ -153,7 +153,7 @@ def findings(evidence: Evidence, titles: Mapping[str, str]) -> str:
         summary = evidence.summary(name) if claims else Summary(models=())
         page = f"[{titles[name]}]({name}.md)" if claims else ""
         for each in rule_on(claims, summary):
-            p = "" if each.p is None else f"{each.p:.3f}"
+            p = "" if each.p is None else f"{each.p:.2g}"
             rows.append((each.claim.text, f"**{each.status}**", p, page))
     return _table(("claim", "verdict", "p", "page"), rows, align=":--")
 

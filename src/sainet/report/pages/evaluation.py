@@ -9,7 +9,7 @@ import numpy as np
 
 from sainet.datasets.store import Store
 from sainet.evaluation.coverage import coverage_of, in_words
-from sainet.evaluation.evaluate import PAPER_STEPS
+from sainet.evaluation.evaluate import steps_to_predict
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.summary import summarise
 from sainet.models.model import Model
@@ -36,6 +36,7 @@ def write_evaluation(
     measured: Measurements,
     path: Path,
     *,
+    steps: int | None = None,
     command: str,
 ) -> Path:
     """Write the page of an evaluation atomically and return its path.
@@ -45,16 +46,16 @@ def write_evaluation(
         store: the pushes.
         measured: their errors.
         path: of the page.
+        steps: that were predicted, as `evaluate` takes them.
         command: that evaluated them.
 
     Raises:
         BadInput: the page cannot be written.
     """
-    playing = [model for model in models if _predicts_here(model, store)]
-    shown = list(shown_pushes(playing, measured))
+    count = steps_to_predict(store, steps)
     replays = [
-        build_replay(playing, store, push, title=title, steps=store.info.steps)
-        for push, title in shown
+        build_replay(models, store, push, title=title, steps=count)
+        for push, title in shown_pushes(models, measured)
     ]
     with TemporaryDirectory() as folder:
         about = Report(
@@ -62,7 +63,7 @@ def write_evaluation(
             subtitle=f"Errors of {len(models)} models on {store.info.pushes} pushes",
             summary="\n\n".join(f"{each}." for each in in_words(coverage_of(measured))),
             table=summarise(measured),
-            figures=list(_figures(playing, store, Path(folder))),
+            figures=list(_figures(models, store, count, Path(folder))),
             replays=replays,
             manifest=read_json(store.path / CONFIG),
             commands=(command,),
@@ -86,17 +87,11 @@ def shown_pushes(models: Sequence[Model], measured: Measurements) -> Iterator[Sh
 
 
 def _figures(
-    models: Sequence[Model], store: Store, folder: Path
+    models: Sequence[Model], store: Store, steps: int, folder: Path
 ) -> Iterator[tuple[Path, str]]:
     """Yield the errors over time; recorded pushes have no common time."""
     if not store.info.is_recorded:
-        steps = min(PAPER_STEPS, store.info.steps)
         curves = error_curves(models, store, steps=steps, pushes=_MOST_AVERAGED)
         path = folder / "error-over-time.svg"
         draw_error_over_time(curves, path, time_step=store.info.time_step)
         yield path, "Mean position error of each disk over the time of a push."
-
-
-def _predicts_here(model: Model, store: Store) -> bool:
-    hashes, info = store.push_hashes, store.info
-    return model.dynamics.recall(hashes, info.steps, info.bodies) is None

@@ -13,14 +13,7 @@ from markupsafe import Markup
 from sainet.control.record import EpisodeRecord
 from sainet.evaluation.summary import Summary
 from sainet.report.arrange import arrange
-from sainet.report.episode_frames import (
-    EndRegion,
-    Replay,
-    Track,
-    episode_data,
-    numbers,
-    plane,
-)
+from sainet.report.episode_frames import Replay, Track, episode_data, numbers, plane
 from sainet.report.pages import read, render
 from sainet.report.palette import css_variables, styles_of
 from sainet.report.table import Table
@@ -158,7 +151,7 @@ def replay_data(replay: Replay) -> dict[str, object]:
                 "dash": list(styles[name].dash),
                 "isTruth": track is reference,
                 "bodies": _bodies(track),
-                "region": _region(track.region) if track.region else None,
+                "region": _region(track),
             }
             for name, track in replay.tracks.items()
         ],
@@ -178,12 +171,15 @@ def _bodies(track: Track) -> list[dict[str, list[float | None]]]:
     ]
 
 
-def _region(region: EndRegion) -> dict[str, object]:
-    axes = (1e3 * np.asarray(region.axes, float)).round(_DECIMALS_MM)
+def _region(track: Track) -> dict[str, object] | None:
+    """Return the region of the end as JSON values: rad, mm, and degrees."""
+    region = track.region
+    if region is None:
+        return None
     return {
         "heading": round(region.heading, _DECIMALS_RAD),
-        "axes": axes.tolist(),  # mm
-        "turn": np.degrees(region.turn, dtype=float).round(1).tolist(),  # degrees
+        "axes": (1e3 * np.asarray(region.axes, float)).round(_DECIMALS_MM).tolist(),
+        "turn": np.degrees(region.turn, dtype=float).round(1).tolist(),
     }
 
 

@@ -25,6 +25,14 @@ function circle(context, [x, y], radius) {
   context.arc(x, y, radius, 0, 2 * Math.PI);
 }
 
+// Fills the current path so that what lies under it remains visible.
+function tint(context, color, share) {
+  context.globalAlpha = share;
+  context.fillStyle = color;
+  context.fill();
+  context.globalAlpha = 1;
+}
+
 function drawLine(context, from, to) {
   context.beginPath();
   context.moveTo(...from);
@@ -43,10 +51,7 @@ function drawEllipse(context, view, middle, axes, heading, color) {
   const [along, across] = axes.map((length) => length * view.scale);
   context.beginPath();
   context.ellipse(...view.at(middle.x, middle.y), along, across, -heading, 0, 2 * Math.PI);
-  context.globalAlpha = 0.12;
-  context.fillStyle = color;
-  context.fill();
-  context.globalAlpha = 1;
+  tint(context, color, 0.12);
   strokeWith(context, color, 1);
   context.stroke();
 }
@@ -61,10 +66,7 @@ function drawMark(context, view, pose, radius, inner) {
 
 function drawTrueDisk(context, view, pose, radius, ink) {
   circle(context, view.at(pose.x, pose.y), radius * view.scale);
-  context.globalAlpha = 0.13;
-  context.fillStyle = ink;
-  context.fill();
-  context.globalAlpha = 1;
+  tint(context, ink, 0.13);
   strokeWith(context, ink, 1.25);
   context.stroke();
   drawMark(context, view, pose, radius, 0.72);

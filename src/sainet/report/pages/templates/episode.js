@@ -78,10 +78,7 @@ class Episode extends Transport {
     const [pose, radius] = [poseAt(this.data, body, this.step), this.data.radius[body]];
     const color = this.colors[body];
     circle(context, this.view.at(pose.x, pose.y), radius * this.view.scale);
-    context.globalAlpha = 0.3;
-    context.fillStyle = color;
-    context.fill();
-    context.globalAlpha = 1;
+    tint(context, color, 0.3);
     strokeWith(context, color, 1.5);
     context.stroke();
     drawMark(context, this.view, pose, radius, 0.8);
