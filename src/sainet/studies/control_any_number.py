@@ -52,8 +52,8 @@ def _trials(label: str, config: ControlConfig) -> RunTrials:
 
 
 _ANY = SAIN_ANY.slug
-# Declared before any of these trials; those of three disks were measured before with
-# another cost and without `sain-any`.
+# Declared before any of these trials, with twice as many goals of three disks, which
+# were measured before with another cost and without `sain-any`.
 STUDY = Study(
     question="Which model pushes rows of more disks to goals?",
     plan=_rows,
