@@ -288,6 +288,7 @@ ENGINEER = (
     "report/figures/recordings",
     "report/pages/inspection",
 )
+SCREENING = ("planning/screening",)
 # With lines that stood in studies/demo.py before.
 PAGE_OF_EVALUATION = ("report/replays", "report/pages/evaluation")
 
@@ -306,6 +307,7 @@ LATER = ADDED + modules_of(
     + CHOOSING
     + ENGINEER
     + PAGE_OF_EVALUATION
+    + SCREENING
     + ENSEMBLES
     + ANY_NUMBER
     + WHOLE_PAPER
@@ -326,6 +328,7 @@ CONNECTIONS = {
     "episodes of several models side by side": 50,
     # Also durations, the report of all studies, and fewer training runs.
     "the whole paper": 262,
+    "screening of pushes": 20,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.
     "many machines": 245,
@@ -408,6 +411,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(PAGE_OF_EVALUATION))),
         150,
         150,
+    ),
+    "code lines of screening pushes": (
+        lambda: sum(map(code_lines, modules_of(SCREENING))),
+        95,
+        95,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

@@ -39,6 +39,14 @@ class AbstractDynamics(eqx.Module):
         return False
 
     @property
+    def engine_alone(self) -> "PhysicsDynamics | None":
+        """Its engine without a corrector; None if it has none, or one on the host.
+
+        Planners screen sequences of pushes with it.
+        """
+        return None
+
+    @property
     def made_for(self) -> Purpose | None:
         """The pushes that its corrector is for; None without a corrector."""
         return None
@@ -155,6 +163,11 @@ class SimulatorAugmented(AbstractDynamics):
     def on_host(self) -> bool:
         """Whether the engine works outside JAX."""
         return self.engine.on_host
+
+    @property
+    def engine_alone(self) -> PhysicsDynamics | None:
+        """Its engine, unless that works outside JAX."""
+        return None if self.on_host else PhysicsDynamics(self.engine)
 
     @property
     def made_for(self) -> Purpose:

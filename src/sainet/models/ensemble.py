@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors import Purpose, Region, Start
 from sainet.models.correctors.network import AbstractNetwork
-from sainet.models.dynamics import AbstractDynamics, Given
+from sainet.models.dynamics import AbstractDynamics, Given, PhysicsDynamics
 from sainet.models.inputs import push_frame
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
@@ -51,6 +51,13 @@ class Ensemble(AbstractDynamics):
     def on_host(self) -> bool:
         """Whether the engine works outside JAX."""
         return self.engine is not None and self.engine.on_host
+
+    @property
+    def engine_alone(self) -> PhysicsDynamics | None:
+        """Its engine, unless it has none or that works outside JAX."""
+        if self.engine is None or self.on_host:
+            return None
+        return PhysicsDynamics(self.engine)
 
     @property
     def made_for(self) -> Purpose:

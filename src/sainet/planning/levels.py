@@ -22,7 +22,7 @@ from sainet.tasks.push_to_goal import AbstractTask
 SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 
 _NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
-_AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
+AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
 
 
 class Outcomes(NamedTuple):
@@ -34,7 +34,7 @@ class Outcomes(NamedTuple):
     solved: Bool[Array, "*batch"]
 
 
-def every_push(
+def judge(
     dynamics: AbstractDynamics,
     task: AbstractTask,
     scene: Scene,
@@ -43,34 +43,29 @@ def every_push(
     *,
     expected: bool = False,
 ) -> Outcomes:
-    """Return the outcome of every push from every state, until all bodies rest.
+    """Return the outcome of one push from each state, until all bodies rest.
 
-    Compiled once for each number of states, split over all devices.
+    Compiled once for each number of pushes, split over all devices.
 
     Args:
         dynamics: model that predicts.
         task: task that judges.
         scene: one scene, without a batch axis.
-        states: states at rest, ``[state]``.
-        pushes: candidate pushes, ``[push]``.
+        states: states at rest, ``[push]``.
+        pushes: from these states, ``[push]``.
         expected: whether cost and distance are means over where the model expects the
             disks.
 
     Returns:
-        The outcomes, ``[state, push]``, as NumPy arrays.
+        The outcomes, ``[push]``, as NumPy arrays.
     """
-    count, actions = states.angle.shape[0], pushes.length.shape[0]
-    # NumPy: JAX would dispatch each of the many small operations of a search.
-    rows = jax.tree.map(lambda x: np.repeat(x, actions, axis=0), states)
-    each = jax.tree.map(lambda x: np.tile(x, count), pushes)
     shared = dynamics, task, scene
     if dynamics.on_host:  # the engine uses every core itself
-        flat = _judge(shared, *jax.tree.map(jnp.asarray, (rows, each)))
+        found = _judge(shared, *jax.tree.map(jnp.asarray, (states, pushes)))
     else:
-        judge = _judge_expected if expected else _judge
-        flat = over_devices(judge, shared, rows, each, most=_AT_ONCE)
-    flat = jax.device_get(flat)
-    return jax.tree.map(lambda x: x.reshape(count, actions, *x.shape[1:]), flat)
+        function = _judge_expected if expected else _judge
+        found = over_devices(function, shared, states, pushes, most=AT_ONCE)
+    return jax.device_get(found)
 
 
 def roll_pushes(
@@ -92,13 +87,27 @@ def _judge(
 ) -> Outcomes:
     dynamics, task, scene = shared
     scenes = batch_of(scene, states.angle.shape[0])
+    ends = ends_of(dynamics, scenes, states, pushes)
+    return outcomes_of(task, scenes, states, pushes, ends)
+
+
+def ends_of(
+    dynamics: AbstractDynamics, scenes: Scene, states: State, pushes: Push
+) -> State:
+    """Return where one push from each state ends, at rest; all share one batch axis."""
     end = roll_pushes(dynamics, scenes, states, pushes).final
-    rest = at_rest(end.position, end.angle, end.pusher_position)
-    cost, solved = task.cost(rest), task.is_solved(scenes, rest)
-    if scene.body_count > _NEVER_IN_THE_WAY:
+    return at_rest(end.position, end.angle, end.pusher_position)
+
+
+def outcomes_of(
+    task: AbstractTask, scenes: Scene, states: State, pushes: Push, ends: State
+) -> Outcomes:
+    """Return ends of pushes as the task judges them; all share one batch axis."""
+    cost, solved = task.cost(ends), task.is_solved(scenes, ends)
+    if scenes.body_count > _NEVER_IN_THE_WAY:
         free = _has_room(scenes, states, pushes)
         cost, solved = jnp.where(free, cost, jnp.inf), solved & free
-    return Outcomes(rest, cost, task.distance(rest), solved)
+    return Outcomes(ends, cost, task.distance(ends), solved)
 
 
 def _judge_expected(
@@ -108,9 +117,8 @@ def _judge_expected(
     dynamics, task, scene = shared
     found = _judge(shared, states, pushes)
     scenes = batch_of(scene, states.angle.shape[0])
-    region = dynamics.region(
-        scenes, *command_path(scenes, states, pushes, steps=SETTLED_STEPS)
-    )
+    commanded = command_path(scenes, states, pushes, steps=SETTLED_STEPS)
+    region = dynamics.region(scenes, *commanded)
     if region is None:
         return found
     possible = jnp.isfinite(found.cost)
@@ -151,17 +159,15 @@ class Problem:
         """Whether the goal is within 10 mm (as in the paper)."""
         return float(self.task.distance(self.state)) < _NEAR
 
-    def expand(self, states: State) -> Outcomes:
-        """Return the outcomes of every push from every state."""
-        return every_push(
-            *(self.dynamics, self.task, self.scene, states, self.pushes),
-            expected=self.expected,
-        )
+    def at(self, actions: Int[np.ndarray, " push"]) -> Push:
+        """Return some of the candidate pushes."""
+        return jax.tree.map(lambda x: x[actions], self.pushes)
 
     def first_level(self) -> "Level":
         """Return the sequences of one push."""
         root = jax.tree.map(lambda x: np.asarray(x)[None], self.state)
-        return flatten(self.expand(root), np.zeros((1, 0), int))
+        start = Outcomes(root, jnp.zeros(1), jnp.zeros(1), jnp.zeros(1, bool))
+        return Level(start, np.zeros((1, 0), int)).grow(np.zeros(1, int), self)
 
 
 @dataclass(frozen=True)
@@ -181,6 +187,12 @@ class Level:
 
     outcomes: Outcomes  # [sequence]
     actions: Int[np.ndarray, "sequence push"]  # indices into the grid
+    screened_out: int = 0  # further sequences, which only an engine predicted
+
+    @property
+    def looked_at(self) -> int:
+        """The number of predicted sequences."""
+        return len(self.actions) + self.screened_out
 
     @property
     def cost(self) -> Float[np.ndarray, " sequence"]:
@@ -193,12 +205,28 @@ class Level:
 
     def grow(self, rows: Int[np.ndarray, " row"], problem: Problem) -> "Level":
         """Return some sequences, extended by every push."""
-        states = jax.tree.map(lambda x: x[rows], self.outcomes.state)
-        found, possible = problem.expand(states), np.isfinite(self.cost[rows])[:, None]
-        # No push follows an infeasible push.
+        count = len(problem.pushes.length)
+        each = np.tile(np.arange(count), len(rows))
+        return self.extend(np.repeat(rows, count), each, problem)
+
+    def extend(
+        self,
+        rows: Int[np.ndarray, " push"],
+        actions: Int[np.ndarray, " push"],
+        problem: Problem,
+    ) -> "Level":
+        """Return some sequences, each extended by one push."""
+        states, pushes = self.after(rows), problem.at(actions)
+        given = problem.dynamics, problem.task, problem.scene, states, pushes
+        found = judge(*given, expected=problem.expected)
+        possible = np.isfinite(self.cost[rows])  # no push follows an infeasible push
         cost, solved = np.where(possible, found.cost, np.inf), found.solved & possible
-        found = found._replace(cost=cost, solved=solved)
-        return flatten(found, self.actions[rows])
+        grown = np.concatenate([self.actions[rows], actions[:, None]], axis=1)
+        return Level(found._replace(cost=cost, solved=solved), grown)
+
+    def after(self, rows: Int[np.ndarray, " push"]) -> State:
+        """Return the states at the end of some sequences."""
+        return jax.tree.map(lambda x: x[rows], self.outcomes.state)
 
     def found(self, row: int, looked_at: int, *, is_complete: bool = True) -> Found:
         """Return one of the sequences as the result of a search."""
@@ -211,15 +239,6 @@ class Level:
         )
 
 
-def flatten(outcomes: Outcomes, parents: Int[np.ndarray, "state push"]) -> Level:
-    """Return outcomes ``[state, push]`` as sequences, one per row."""
-    states, pushes = outcomes.cost.shape
-    last = np.tile(np.arange(pushes), states)[:, None]
-    actions = np.concatenate([np.repeat(parents, pushes, axis=0), last], axis=1)
-    flat = jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), outcomes)
-    return Level(flat, actions)
-
-
 def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     """Return the shortest sequence that solves the task, else that of least cost.
 
@@ -230,14 +249,13 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     Raises:
         Diverged: no cost is finite.
     """
-    looked_at = sum(len(level.actions) for level in levels)
+    looked_at = sum(level.looked_at for level in levels)
     for level in levels:
         solved = level.outcomes.solved
         if solved.any():
             distance = np.where(solved, level.outcomes.distance, np.inf)
-            return level.found(
-                int(np.argmin(distance)), looked_at, is_complete=is_complete
-            )
+            nearest = int(np.argmin(distance))
+            return level.found(nearest, looked_at, is_complete=is_complete)
     best = min(levels, key=lambda level: level.cost.min())
     if not np.isfinite(best.cost.min()):
         raise Diverged(
