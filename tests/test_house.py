@@ -288,7 +288,7 @@ ENGINEER = (
     "report/figures/recordings",
     "report/pages/inspection",
 )
-SCREENING = ("planning/screening",)
+SCREENING = ("planning/screening", "bench/screening")
 # With lines that stood in studies/demo.py before.
 PAGE_OF_EVALUATION = ("report/replays", "report/pages/evaluation")
 
@@ -414,8 +414,8 @@ COUNTS = {
     ),
     "code lines of screening pushes": (
         lambda: sum(map(code_lines, modules_of(SCREENING))),
-        95,
-        95,
+        135,
+        135,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

@@ -35,8 +35,10 @@ from sainet.learning.step import trained_layers, with_layers
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.features import feature_set
 from sainet.models.inputs import Drive, Still, in_columns
+from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadInput, SainetError, UnknownName
 from sainet.runs.names import load_named
+from sainet.scenes.pushes import PushGrid
 
 TIME_STEP = 1 / 240
 load_case = partial(load_named, "benchmark", CASES)
@@ -170,6 +172,21 @@ def test_disks_reports_the_documented_figures():
     json.dumps(figures, allow_nan=False)
 
 
+def test_screening_reports_the_documented_figures(monkeypatch):
+    few = partial(TreePlanner, actions=PushGrid(contact_bins=5, direction_bins=4))
+    monkeypatch.setattr("sainet.bench.screening.TreePlanner", few)
+    monkeypatch.setattr("sainet.bench.screening.DECISIONS", 2)
+    figures = load_case("screening")(1, models=("sain-any",), disks=(2,))
+    wanted = ("screened_s", "unscreened_s", "same_first_push")
+    assert tuple(figures) == (
+        *(f"sain-any_2_{x}" for x in wanted),
+        "decisions",
+        "devices",
+    )
+    assert figures["sain-any_2_same_first_push"] in (0, 0.5, 1)
+    assert all_finite(figures)
+
+
 @pytest.mark.slow
 def test_environments_reports_the_documented_figures():
     figures = load_case("environments")(1, worlds=3)
@@ -229,7 +246,7 @@ def test_the_ceiling_is_a_plausible_rate():
 
 
 def test_an_unknown_case_lists_the_available_cases():
-    every = "disks, engines, environments, planning, training"
+    every = "disks, engines, environments, planning, screening, training"
     with pytest.raises(UnknownName, match=f"'trainin'.*{every}"):
         load_case("trainin")
 

@@ -14,5 +14,6 @@ CASES = {
     "engines": "sainet.bench.engines:bench_engines",
     "environments": "sainet.bench.environments:bench_environments",
     "planning": "sainet.bench.planning:bench_planning",
+    "screening": "sainet.bench.screening:bench_screening",
     "training": "sainet.bench.training:bench_training",
 }

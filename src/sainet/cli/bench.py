@@ -62,8 +62,8 @@ class Bench:
     """Measure the speed of training, engines and planning on this machine."""
 
     cases: Positional[tuple[str, ...]] = ()
-    """Benchmark cases: training, engines, planning, disks, environments, and
-    commands, which takes an hour. Default: all but commands."""
+    """Benchmark cases: training, engines, planning, screening, disks, environments,
+    and commands, which takes an hour. Default: all but commands."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
