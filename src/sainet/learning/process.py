@@ -10,9 +10,10 @@ import jax
 import jax.numpy as jnp
 import msgspec
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
+from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
-from tinygp import GaussianProcess
+from scipy.spatial.distance import cdist
 
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
@@ -23,7 +24,6 @@ from sainet.models.correctors import CONFIDENCE
 from sainet.models.correctors.process import (
     BODIES,
     RESIDUALS,
-    kernel_of,
 )
 from sainet.models.identity import ModelId
 from sainet.models.process_card import (
@@ -205,33 +205,40 @@ def _most_probable(
     names = ["amplitude", "noise", *["length"] * inputs.shape[1]]
     prior = np.array([_PRIOR[name] for name in names])
 
-    def loss(at: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = _loss_and_slope(at, inputs, values, prior)
-        return float(value), np.asarray(slope)
-
-    with jax.enable_x64(True):
-        found: Any = minimize(
-            loss,
-            prior if begin is None else begin,
-            jac=True,
-            method="L-BFGS-B",
-            bounds=[_BOUNDS[name] for name in names],
-            options={"maxiter": most},
-        )
+    found: Any = minimize(
+        functools.partial(_loss_and_slope, inputs=inputs, values=values, prior=prior),
+        prior if begin is None else begin,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[_BOUNDS[name] for name in names],
+        options={"maxiter": most},
+    )
     return found.x, float(found.fun)
 
 
-# A last input is 0 in all pushes and has no effect. With one input alone, XLA compiles
-# wrong code for CPUs (jaxlib 0.10.2): the loss of 17 to 27 pushes is wrong or infinite.
-@functools.partial(jax.jit)
-@functools.partial(jax.value_and_grad)
-def _loss_and_slope(at: Array, inputs: Array, values: Array, prior: Array) -> Array:
-    """Return the negative log density of values and parameters."""
-    kernel = kernel_of(jnp.exp(at[0]), jnp.append(jnp.exp(at[2:]), 1.0))
-    inputs = jnp.pad(inputs, ((0, 0), (0, 1)))
-    process = GaussianProcess(kernel, inputs, diag=jnp.exp(2 * at[1]))
-    doubt = jnp.sum(((at - prior) / _PRIOR_WIDTH) ** 2) / 2
-    return doubt - process.log_probability(values)
+def _loss_and_slope(
+    at: np.ndarray, inputs: np.ndarray, values: np.ndarray, prior: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """Return the negative log density of values and parameters, and its gradient.
+
+    Rasmussen and Williams (2006), eq. 5.8 and 5.9, with the kernel of `kernel_of`.
+    """
+    scaled, noise = inputs / np.exp(at[2:]), np.exp(2 * at[1])
+    far = np.sqrt(3 * cdist(scaled, scaled, "sqeuclidean"))
+    faded = np.exp(2 * at[0] - far)
+    signal = (1 + far) * faded
+    factor = np.linalg.cholesky(signal + noise * np.eye(len(values)))
+    half = solve_triangular(factor, np.eye(len(values)), lower=True)
+    inverse = half.T @ half
+    weights = inverse @ values
+    steep = inverse - np.outer(weights, weights)  # twice the slope in the covariance
+    bent = 3 * steep * faded
+    # Sums of `bent` times the squared differences of each input.
+    squares = bent.sum(axis=0) @ scaled**2 - np.sum(scaled * (bent @ scaled), axis=0)
+    slope = np.array([np.sum(steep * signal), noise * np.trace(steep), *squares])
+    off = (at - prior) / _PRIOR_WIDTH
+    size = values @ weights + len(values) * np.log(2 * np.pi) + off @ off
+    return size / 2 + np.sum(np.log(np.diag(factor))), slope + off / _PRIOR_WIDTH
 
 
 def _calibrate(
