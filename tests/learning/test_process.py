@@ -30,6 +30,7 @@ from sainet.models.process_card import (
     Fitted,
     ProcessSettings,
     corrector_of,
+    rates_at,
 )
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.controls import PathControls
@@ -108,14 +109,15 @@ def test_mean_and_deviation_are_those_of_the_textbook():
     )
     process = corrector_of(fitted, ("contact_angle", "place_x"), 1 / 240)
     raw = rng.normal(size=(5, 2))
-    mean, deviation = process.rates(jnp.asarray(raw, jnp.float32))
-    for push, at in enumerate((raw - fitted.centre) / fitted.width):
-        for output in range(3):
-            known = naive_posterior(fitted, output, at)
-            expected = fitted.mean[output] + fitted.scale[output] * known[0]
-            np.testing.assert_allclose(mean[push, output], expected, atol=1e-4)
-            wide = fitted.scale[output] * np.sqrt(known[1])
-            np.testing.assert_allclose(deviation[push, output], wide, rtol=1e-4)
+    single = process.rates(jnp.asarray(raw, jnp.float32))
+    for (mean, deviation), error in ((single, 1e-4), (rates_at(fitted, raw), 1e-12)):
+        for push, at in enumerate((raw - fitted.centre) / fitted.width):
+            for output in range(3):
+                known = naive_posterior(fitted, output, at)
+                expected = fitted.mean[output] + fitted.scale[output] * known[0]
+                np.testing.assert_allclose(mean[push, output], expected, atol=error)
+                wide = fitted.scale[output] * np.sqrt(known[1])
+                np.testing.assert_allclose(deviation[push, output], wide, rtol=error)
 
 
 def test_a_process_errs_less_than_the_engine_that_it_corrects(model, tests):

@@ -7,13 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import msgspec
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
-from scipy.spatial.distance import cdist
 
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
@@ -33,7 +31,8 @@ from sainet.models.process_card import (
     Fitted,
     ProcessCard,
     ProcessSettings,
-    corrector_of,
+    rates_at,
+    squared_distances,
 )
 from sainet.runs.digests import digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document
@@ -94,7 +93,7 @@ def fit_process(
         internal = internal(out / ENGINE)
     ends = ends_of(store, internal, settings.features)
     fitted, loss = fit_to(ends, settings, on_output)
-    arrays = _calibrate(ends, fitted, settings, store.info.time_step, on_output)
+    arrays = _calibrate(ends, fitted, settings, on_output)
     with jax.enable_x64(True):
         data = save_arrays(out / ARRAYS, arrays)
     info = store.info
@@ -224,7 +223,7 @@ def _loss_and_slope(
     Rasmussen and Williams (2006), eq. 5.8 and 5.9, with the kernel of `kernel_of`.
     """
     scaled, noise = inputs / np.exp(at[2:]), np.exp(2 * at[1])
-    far = np.sqrt(3 * cdist(scaled, scaled, "sqeuclidean"))
+    far = np.sqrt(3 * squared_distances(scaled, scaled))
     faded = np.exp(2 * at[0] - far)
     signal = (1 + far) * faded
     factor = np.linalg.cholesky(signal + noise * np.eye(len(values)))
@@ -245,7 +244,6 @@ def _calibrate(
     ends: Ends,
     fitted: Fitted,
     settings: ProcessSettings,
-    time_step: float,
     on_output: Callable[[], None],
 ) -> Fitted:
     """Return the process with the factors of deviations that make 90 % regions.
@@ -261,10 +259,9 @@ def _calibrate(
     for fold in range(settings.folds):
         others, held = ends.take(owner != fold), ends.take(owner == fold)
         part, _ = fit_to(others, settings, on_output, begin)
-        process = corrector_of(part, ends.names, time_step)
-        mean, deviation = process.rates(jnp.asarray(held.inputs, jnp.float32))
-        off = held.rates - np.asarray(mean)
-        scores.append(_sizes(off / np.asarray(deviation)))
+        mean, deviation = rates_at(part, held.inputs)
+        off = held.rates - mean
+        scores.append(_sizes(off / deviation))
         plain.append(_sizes(off))
     return fitted._replace(
         reach=quantile(np.concatenate(scores)), plain=quantile(np.concatenate(plain))

@@ -20,7 +20,6 @@ from sainet.models.correctors.process import (
     Process,
     ResidualProcess,
     input_names,
-    kernel_of,
 )
 from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.runs.documents import content_hash, read_document, read_file
@@ -151,11 +150,37 @@ def covariance_between(
     other: Float[np.ndarray, "other input"],
 ) -> Float[np.ndarray, "one other"]:
     """Return the prior covariance of an output at standardised inputs, no noise."""
-    with jax.enable_x64(True):
-        kernel = kernel_of(
-            jnp.asarray(fitted.amplitude[output]), jnp.asarray(fitted.length[output])
-        )
-        return np.array(kernel(jnp.asarray(one), jnp.asarray(other)))
+    length = fitted.length[output]
+    far = np.sqrt(3 * squared_distances(one / length, other / length))
+    return fitted.amplitude[output] ** 2 * (1 + far) * np.exp(-far)
+
+
+def squared_distances(
+    one: Float[np.ndarray, "one input"], other: Float[np.ndarray, "other input"]
+) -> Float[np.ndarray, "one other"]:
+    """Return the squared distances of points, by one product of matrices."""
+    sizes = np.add.outer(np.sum(one**2, axis=1), np.sum(other**2, axis=1))
+    return np.maximum(sizes - 2 * one @ other.T, 0.0)
+
+
+def rates_at(
+    fitted: Fitted, inputs: Float[np.ndarray, "push input"]
+) -> tuple[Float[np.ndarray, "push output"], Float[np.ndarray, "push output"]]:
+    """Return mean and deviation of residuals, as `ResidualProcess.rates` does.
+
+    In double precision and without compilation, which fits to few pushes would spend
+    most of their time on.
+    """
+    points = (inputs - fitted.centre) / fitted.width
+    means, deviations = np.empty((2, len(points), len(fitted.outputs)))
+    for output, values in enumerate(fitted.outputs):
+        factor = cholesky(covariance_of(fitted, output), lower=True)
+        across = covariance_between(fitted, output, fitted.inputs, points)
+        white = solve_triangular(factor, across, lower=True)
+        left = fitted.amplitude[output] ** 2 - np.sum(white**2, axis=0)
+        deviations[:, output] = np.sqrt(np.maximum(left, 0) + fitted.noise[output])
+        means[:, output] = across.T @ cho_solve((factor, True), values)
+    return fitted.mean + fitted.scale * means, fitted.scale * deviations
 
 
 def is_process(folder: Path) -> bool:

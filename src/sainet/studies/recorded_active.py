@@ -5,7 +5,6 @@ identified on the first few pushes, drawn at random; then pushes of the pool are
 those that `choose_pushes` names or others at random, and the process is fitted again.
 """
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -25,7 +24,7 @@ from sainet.learning.choosing import choose_pushes
 from sainet.learning.process import fit_to
 from sainet.learning.process_ends import Ends, ends_of
 from sainet.models.identity import ModelId
-from sainet.models.process_card import Fitted, ProcessSettings, corrector_of
+from sainet.models.process_card import ProcessSettings, rates_at
 from sainet.runs.errors import BadStore
 from sainet.studies import Scale
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
@@ -93,20 +92,12 @@ def _errors(
     for more in np.diff((*counts, counts[-1])):
         has = np.isin(np.arange(len(ends.travel)), known)
         fitted, _ = fit_to(ends.take(has), SETTINGS)
-        found.append(_missed(ends, tests, _predicted(fitted, ends, tests)))
+        found.append(_missed(ends, tests, rates_at(fitted, ends.inputs[tests])[0]))
         rest = order[~np.isin(order, known)]
         if chosen and more:
             rest = rest[choose_pushes(fitted, ends.inputs[rest], int(more))[0]]
         known = np.concatenate([known, rest[:more]])
     return found
-
-
-def _predicted(
-    fitted: Fitted, ends: Ends, rows: Int[np.ndarray, " some"]
-) -> Float[np.ndarray, "some output"]:
-    process = corrector_of(fitted, ends.names, 1.0)
-    inputs = jnp.asarray(ends.inputs[rows], jnp.float32)
-    return np.asarray(process.rates(inputs)[0], np.float64)
 
 
 def _missed(
