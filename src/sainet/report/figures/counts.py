@@ -7,7 +7,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
 
-from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.report.figures import canvas
 from sainet.report.figures.curves import METRICS
@@ -55,16 +54,10 @@ def _lines(
 ) -> Mapping[str, Line]:
     """Return the errors of each model in an arrangement, from few disks to many."""
     fewest = min(int(each.factors["disks"]) for each in summary.conditions)
-
-    def belongs(each: Condition) -> bool:
-        return each.factors["disks"] == fewest or (
-            each.factors["arrangement"] == arrangement
-        )
-
     places = sorted(
         (int(each.factors["disks"]), each.label)
         for each in summary.conditions
-        if belongs(each)
+        if each.factors["disks"] == fewest or each.factors["arrangement"] == arrangement
     )
     return {
         model: [
