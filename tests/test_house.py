@@ -215,6 +215,9 @@ TRUST = (
     "models/correctors/process",
     "cli/process",
     "evaluation/coverage",
+    # With lines that stood in models/library.py before.
+    "evaluation/unlike",
+    "datasets/groups",
     "planning/expectation",
     "studies/expected_cost",
     "report/about_models",
@@ -338,7 +341,7 @@ COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
         lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
-        15_450,
+        15_440,
         11_000,
     ),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),
@@ -364,8 +367,8 @@ COUNTS = {
     ),
     "code lines of models that know how sure they are": (
         lambda: sum(map(code_lines, modules_of(TRUST))),
-        1_065,
-        1_065,
+        1_122,
+        1_122,
     ),
     "code lines of cross-validation": (
         lambda: sum(map(code_lines, modules_of(VALIDATION))),

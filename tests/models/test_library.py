@@ -6,11 +6,10 @@ import sys
 import pytest
 
 from models.test_checkpoint import edit_card, edit_simulator, write_network
-from sainet.engines import RECORDED
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.models.card import CARD
 from sainet.models.dynamics import SimulatorAugmented
-from sainet.models.library import PRETRAINED, SHIPPED, load_model, other_worlds
+from sainet.models.library import PRETRAINED, SHIPPED, load_model
 from sainet.runs.errors import BadCheckpoint, MissingExtra
 from sainet.scenes.scene import TIME_STEP
 
@@ -73,14 +72,3 @@ def test_training_pushes_are_refused_as_test_pushes(folder):
         model.check_fits("robot", TIME_STEP, seed=4)
     for seed in (1, None):
         model.check_fits("robot", TIME_STEP, seed=seed)
-
-
-def test_networks_of_another_world_are_named_in_one_line():
-    models = [load_model(name) for name in ("physics", "in", "sain", "sain-stroke")]
-    assert list(other_worlds(models[:3], "bullet")) == []
-    recorded = list(other_worlds(models, RECORDED))
-    assert [line.partition(":")[0] for line in recorded] == ["in, sain", "sain-stroke"]
-    assert "simulated by bullet, but these are recorded pushes" in recorded[0]
-    assert all("'sainet tune'" in line and "\n" not in line for line in recorded)
-    (simulated,) = other_worlds(models, "planar")
-    assert "but these are pushes simulated by planar" in simulated

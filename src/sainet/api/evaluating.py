@@ -8,7 +8,7 @@ from sainet.api.progress import shown_progress
 from sainet.api.pushes import Dataset, store_of
 from sainet.api.table import ErrorTable
 from sainet.evaluation import evaluate as evaluation
-from sainet.models.library import other_worlds
+from sainet.evaluation.unlike import unlike_pushes
 from sainet.models.model import Model
 from sainet.runs.errors import BadInput
 
@@ -45,7 +45,7 @@ def evaluate(
             f"`models` is '{models}'; give a list, or a model for each name."
         )
     store, found = store_of(pushes), list(_named(models))
-    for warning in other_worlds(found, store.info.engine):
+    for warning in unlike_pushes(found, store):
         _log.warning("%s", warning)
     total = store.info.pushes * len(found)
     with shown_progress("Predicting", total, progress) as advance:

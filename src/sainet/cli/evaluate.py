@@ -65,7 +65,8 @@ class Evaluate:
         from sainet.evaluation.as_json import to_json_object
         from sainet.evaluation.coverage import coverage_of, in_words, to_json
         from sainet.evaluation.summary import summarise
-        from sainet.models.library import load_model, other_worlds
+        from sainet.evaluation.unlike import unlike_pushes
+        from sainet.models.library import load_model
         from sainet.planning.checks import doubts_of_count
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table, write_table
@@ -75,7 +76,7 @@ class Evaluate:
         models = [
             load_model(name, engine=self.engine, force=self.force) for name in names
         ]
-        for warning in other_worlds(models, store.info.engine):
+        for warning in unlike_pushes(models, store):
             self.output.warn(warning)
         for model in models:
             for doubt in doubts_of_count(model.card, store.info.bodies):

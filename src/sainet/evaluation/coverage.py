@@ -164,11 +164,13 @@ def _sentence(found: Coverage) -> str:
     numbers = (*msgspec.structs.astuple(inside), size.value)
     if None in numbers or over.value is None:
         return f"{where}{found.model}: too few pushes to judge its 90 % regions"
+    is_unlike = (inside.high or 0.0) < 100 * CONFIDENCE
+    verdict = "; fewer than they promise: do not trust them on such pushes" * is_unlike
     return (
         f"{where}{found.model}: its 90 % regions hold {inside.value:.0f} % "
         f"[{inside.low:.0f}, {inside.high:.0f}] of the {what} of disk {found.body}; "
         f"half width {size.value:.2f} {UNITS[found.kind]}; interval score "
-        f"{over.value:.2f} of that of regions of one size"
+        f"{over.value:.2f} of that of regions of one size{verdict}"
     )
 
 

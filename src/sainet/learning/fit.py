@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
+from sainet.datasets.groups import groups_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
 from sainet.learning.log import LogLine, append_log, read_log, rewind_log
@@ -234,6 +235,7 @@ def _finish(mixture: Mixture, progress: Progress, folder: RunFolder) -> None:
         counts=counts if counts[1:] else msgspec.UNSET,
         trained_pushes=mixture.pushes,
         pushes=_pushes(mixture, start),
+        groups=groups_of(mixture.stores),
         weights=content_hash(data),
         started_from=start.weights if start else None,
         recipe=task.recipe.settings(),

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
+from sainet.datasets.groups import groups_of
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
@@ -109,6 +110,7 @@ def fit_process(
         disks=info.bodies,
         trained_pushes=len(ends.travel),
         pushes=digests_to_text(store.push_hashes()),
+        groups=groups_of([store]),
         weights=content_hash(data),
         inputs=ends.names,
         recipe=settings,

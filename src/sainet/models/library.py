@@ -1,12 +1,11 @@
 """Models by name: physics, a shipped network, or the folder of a trained one."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 
-from sainet.engines import RECORDED
 from sainet.engines.simulator import (
     PAPER,
     SIMULATORS,
@@ -50,30 +49,6 @@ OF_STROKES = ("in-stroke", "sain-stroke")  # of one disk, as recorded on a robot
 OF_ANY_NUMBER = ("sain-any",)  # of disks: a contact network
 SHIPPED = (*OF_PAPER, *OF_STROKES, *OF_ANY_NUMBER)
 MODELS = (*PHYSICS, *SHIPPED)
-
-
-def other_worlds(models: Iterable[Model], truth_engine: str) -> Iterator[str]:
-    """Yield warnings of networks that were trained on pushes of another world.
-
-    Args:
-        models: those without a network are skipped.
-        truth_engine: engine that made the test pushes, or `RECORDED`.
-    """
-    trained: dict[str, list[str]] = {}
-    for model in models:
-        if model.card and model.card.truth_engine != truth_engine:
-            trained.setdefault(model.card.truth_engine, []).append(model.name)
-    for engine, names in trained.items():
-        yield (
-            f"{', '.join(names)}: trained on {_pushes_of(engine)}, but these are "
-            f"{_pushes_of(truth_engine)}. Expect larger errors; 'sainet tune' adapts a "
-            "network to other pushes."
-        )
-
-
-def _pushes_of(engine: str) -> str:
-    is_recorded = engine == RECORDED
-    return "recorded pushes" if is_recorded else f"pushes simulated by {engine}"
 
 
 def load_model(

@@ -61,6 +61,7 @@ class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
     trained_pushes: Annotated[int, msgspec.Meta(ge=1, le=MOST)]
     data_seeds: tuple[int, ...] = ()
     pushes: str = ""
+    groups: tuple[str, ...] = ()
     weights: str  # hash of the arrays' file
     inputs: Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, max_length=20)]
     recipe: ProcessSettings
@@ -116,24 +117,18 @@ def corrector_of(
     def single(value: np.ndarray) -> jax.Array:
         return jnp.asarray(value, jnp.float32)
 
+    same = ("inputs", "amplitude", "length", "noise", "mean", "scale")
     process = Process(
-        inputs=single(fitted.inputs),
-        amplitude=single(fitted.amplitude),
-        length=single(fitted.length),
-        noise=single(fitted.noise),
         weights=single(np.stack(weights)),
         whitening=single(np.stack(whitening)),
-        mean=single(fitted.mean),
-        scale=single(fitted.scale),
+        **{name: single(getattr(fitted, name)) for name in same},
     )
+    same = ("centre", "width", "reach", "plain")
     return ResidualProcess(
         process,
-        centre=single(fitted.centre),
-        width=single(fitted.width),
-        reach=single(fitted.reach),
-        plain=single(fitted.plain),
         inputs=Inputs(inputs),
         time_step=time_step,
+        **{name: single(getattr(fitted, name)) for name in same},
     )
 
 
