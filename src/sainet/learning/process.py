@@ -79,13 +79,8 @@ def fit_process(
     """
     check_store(store, settings)
     given = "identified" if callable(internal) else msgspec.to_builtins(internal)
-    config = {
-        "command": "tune",
-        "model": "gp",
-        "internal_engine": given,
-        "data": store.content,
-        **msgspec.to_builtins(settings),
-    }
+    config = {"command": "tune", "model": "gp", "internal_engine": given}
+    config |= {"data": store.content, **msgspec.to_builtins(settings)}
     folder = open_run(out, config, finished_by=PROCESS)
     if folder.is_finished:
         _log.info("%s is already finished", out)
