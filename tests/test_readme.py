@@ -3,48 +3,31 @@
 import ast
 import json
 import re
-import runpy
 import shlex
 import subprocess
 import sys
+import tomllib
+from dataclasses import is_dataclass
 from functools import lru_cache
+from pathlib import Path
+from typing import get_args, get_type_hints
 
 import pytest
 
 from api.programs import CONTROL, OWN_DATA, PREDICT
+from documents import (
+    PAGES,
+    README,
+    commands,
+    make_targets,
+    mentions,
+    shell_lines,
+    site_contents,
+)
 from sainet import __version__
+from sainet.cli import entry
 from support import REPOSITORY
 
-README = REPOSITORY / "README.md"
-
-
-def shell_lines(text: str) -> list[str]:
-    """Commands in ```bash blocks: continued lines joined, prompts and comments off.
-
-    In blocks that are indented instead, what begins with `sainet` or `make`.
-    """
-    blocks = re.findall(r"^```bash\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    blocks += re.findall(r"^    ((?:sainet|make) .*)", text, re.MULTILINE)
-    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
-    lines = [line.partition(" > ")[0] for line in lines]  # into a file
-    words = (shlex.split(line.removeprefix("$ "), comments=True) for line in lines)
-    return [shlex.join(line) for line in words if line]
-
-
-def commands(text: str) -> list[str]:
-    """Calls of `sainet` in the text, each once."""
-    found = (line for line in shell_lines(text) if line.startswith("sainet "))
-    return list(dict.fromkeys(found))
-
-
-def make_targets(text: str) -> set[str]:
-    """Targets of every `make X` in the text, in blocks and in running text."""
-    typed = "\n".join(shell_lines(text))
-    inline = re.findall(r"`make ([a-z][a-z-]*)", text)
-    return {*inline, *re.findall(r"^make ([a-z][a-z-]*)", typed, re.MULTILINE)}
-
-
-PAGES = [README, *sorted((REPOSITORY / "docs").glob("*.md"))]
 COMMANDS = {page.name: commands(page.read_text()) for page in PAGES}
 # Reads a list of commands; answers with what each asks for and where that is written.
 # In a process of its own: the types of settings that are left to give are not checked.
@@ -82,6 +65,70 @@ def parsed() -> dict[str, list[str] | None]:
     return json.loads(found.stdout)
 
 
+# Other commands that pages show, and where they run. A new kind needs a test.
+ELSEWHERE = {
+    "make": "test_every_documented_make_target_exists",
+    "python -m build": "test_wheel.py",
+    "python -m pip install build": "test_wheel.py",
+    "../empty/bin/": "test_wheel.py",
+    "python -m venv": "test_wheel.py",
+    "python -m pip install -e": "tools/setup.sh, in CI",
+    "pip install": "extras: below",
+    "dask": "runs/dask_cluster.py",
+    "sainet": "cli/test_documented.py",
+}
+NOT_RUN = {
+    "git clone": "CI has a clone",
+    ". .venv/bin/activate": "changes only the path of commands",
+    "python3.11 -m venv": "the Python of CI",
+    "python -m pip install -U jax[cuda12]": "needs a GPU",
+    "python -c import jax; print(jax.devices())": "needs a GPU",
+    "sbatch": "needs a cluster",
+    "job=$(sbatch": "needs a cluster",
+}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_documented_command_is_run_somewhere(page: Path):
+    _, executed = site_contents()
+    if page.stem in executed:  # with other commands of the shell
+        return
+    known = (*ELSEWHERE, *NOT_RUN)
+    lines = (" ".join(shlex.split(line)) for line in shell_lines(page.read_text()))
+    assert [line for line in lines if not line.startswith(known)] == []
+
+
+def test_documented_extras_exist():
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    found = set()
+    for page in PAGES:
+        for names in re.findall(r"(?:sainet|\.)\[([a-z,]+)\]", page.read_text()):
+            found |= set(names.split(","))
+    assert {"bullet", "gym", "live", "mujoco"} <= found
+    assert found <= set(project["optional-dependencies"])
+
+
+def test_commands_in_running_text_have_the_options_that_they_name():
+    for page in PAGES:
+        for words in map(str.split, mentions(page.read_text())):
+            kind = entry._COMMANDS[words[1]]
+            options = {word for word in words if word.startswith("--")} - {"--help"}
+            assert options <= options_of(kind), f"{page.name}: {words}"
+
+
+def options_of(kind: type) -> set[str]:
+    """Options of a command, with those of settings in its fields."""
+    found: set[str] = set()
+    for name, hint in get_type_hints(kind).items():
+        parts = [each for each in (hint, *get_args(hint)) if is_dataclass(each)]
+        found |= set().union(*map(options_of, parts)) if parts else {as_option(name)}
+    return found
+
+
+def as_option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
 @pytest.mark.parametrize("page", COMMANDS)
 def test_documented_commands_parse_and_use_distinct_folders(page: str):
     folders: dict[str, str] = {}
@@ -106,13 +153,6 @@ def test_the_programs_of_the_readme_are_those_that_tests_run():
 
 def test_the_readme_is_short():
     assert len(README.read_text().splitlines()) <= 120
-
-
-def site_contents() -> tuple[dict[str, list[str]], set[str]]:
-    """Return the pages of the site by section, and the pages that `make docs` runs."""
-    path = REPOSITORY / "docs" / "site_pages" / "contents.py"
-    found = runpy.run_path(str(path))
-    return found["CONTENTS"], found["EXECUTED"]
 
 
 def test_the_site_runs_every_page_with_python_in_it():

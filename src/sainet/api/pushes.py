@@ -8,7 +8,7 @@ from tempfile import mkdtemp
 from weakref import finalize
 
 import numpy as np
-from jaxtyping import UInt64
+from jaxtyping import Int, UInt64
 
 from sainet.api.progress import shown_progress
 from sainet.datasets.batch import PushBatch, to_batch
@@ -74,7 +74,7 @@ class Pushes:
         """
         return replace(self, store=self.store.first(count))
 
-    def take(self, rows: Iterable[int]) -> "Pushes":
+    def take(self, rows: Iterable[int] | Int[np.ndarray, " row"]) -> "Pushes":
         """Return only the pushes with these indices, in this order.
 
         Raises:
