@@ -4,7 +4,7 @@ Needs PyTorch: pip install 'sainet[gym]' stable-baselines3
 Run: python examples/reinforcement_learning/her.py [pushes]
 
 It prints the share of training episodes that ended at their goal, then tries 20 other
-goals with the policy and with random pushes. Expect few solved goals after some thousand
+goals with the policy and with random pushes. Expect few solved goals after thousands of
 pushes: the tolerance is a few mm, and a goal is several pushes away. A planner
 (`sn.GreedyPlanner`) needs no training on goals.
 """
