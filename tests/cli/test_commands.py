@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import pytest
 
+from sainet import __version__
 from sainet.cli import entry
 from sainet.cli.bench import Bench
 from sainet.cli.datasets import Generate
@@ -79,7 +80,7 @@ def sainet_alone(*words, **environment):
 
 
 def test_version():
-    assert sainet_alone("--version").stdout == "sainet 0.1.0\n"
+    assert sainet_alone("--version").stdout == f"sainet {__version__}\n"
 
 
 def test_without_arguments_the_help_is_printed():

@@ -188,6 +188,7 @@ def next_iteration(state, batch):
     return eqx.tree_at(lambda s: s.iteration, state, state.iteration + 1), jnp.ones(())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [p for p in TEXTS if not is_run_by_the_site(p)])
 def test_the_commands_of_a_page_run(page, workplace, without_what_takes_long):
     for name in filter(None, (AFTER.get(page), page)):
