@@ -235,7 +235,7 @@ def _finish(mixture: Mixture, progress: Progress, folder: RunFolder) -> None:
         counts=counts if counts[1:] else msgspec.UNSET,
         trained_pushes=mixture.pushes,
         pushes=_pushes(mixture, start),
-        groups=groups_of(mixture.stores),
+        groups=groups_of(mixture.stores) or msgspec.UNSET,
         weights=content_hash(data),
         started_from=start.weights if start else None,
         recipe=task.recipe.settings(),

@@ -73,7 +73,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     trained_pushes: Count  # number of pushes in the training data
     data_seeds: tuple[int, ...] = ()  # of simulated training pushes not in `pushes`
     pushes: str = ""  # training pushes (`runs.digests`)
-    groups: tuple[str, ...] = ()  # of recorded training pushes
+    groups: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET  # of recorded pushes
     weights: str  # hash of the weights' file
     started_from: str | None = None  # hash of the weights that training began with
     recipe: TrainingSettings
