@@ -18,6 +18,11 @@ def batch_mesh() -> Mesh:
     return jax.make_mesh((jax.device_count(),), (BATCH,), axis_types=(AxisType.Auto,))
 
 
+def is_one_gpu() -> bool:
+    """Return whether JAX computes on a single GPU."""
+    return jax.default_backend() == "gpu" and jax.device_count() == 1
+
+
 @eqx.filter_jit
 def over_devices(
     function: Callable[..., Any],

@@ -1,7 +1,9 @@
 """Batches as training uses them: predicted, some mirrored, or cut into steps."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 
 import equinox as eqx
 import jax
@@ -11,6 +13,7 @@ from jaxtyping import Array, Bool, Float
 
 from sainet.datasets.batch import PushBatch
 from sainet.engines.base import AbstractEngine
+from sainet.engines.devices import is_one_gpu
 from sainet.models.correctors import Start
 from sainet.models.correctors.held import unroll_held
 from sainet.models.correctors.network import AbstractNetwork
@@ -116,7 +119,6 @@ def predict_batch(
         batch: of pushes, with s-bar for SAIN.
         hold: length of the zero-order hold of an additive network (steps).
     """
-    is_held = isinstance(network.integrator, RelaxingResidual) and hold > 1
     initial, has_simulator = batch.initial, network.features.has_simulator
     frame = push_frame(batch.scene, initial)
     return network.in_frame(
@@ -124,5 +126,17 @@ def predict_batch(
         Start(initial, frame, initial if has_simulator else None),
         batch.controls,
         batch.simulated if has_simulator else None,
-        unroll=partial(unroll_held, hold=hold) if is_held else None,
+        unroll=_unroll(network, batch.scene.body_count, hold),
     )
+
+
+def _unroll(
+    network: AbstractNetwork, disks: int, hold: int
+) -> Callable[..., Array] | None:
+    """Return how training applies a network; None is as prediction does."""
+    if isinstance(network.integrator, RelaxingResidual) and hold > 1:
+        return partial(unroll_held, hold=hold)
+    if is_one_gpu():
+        fused = import_module("sainet.models.correctors.fused")  # imports Pallas
+        return fused.unroll_fused if fused.fits(network, disks) else None
+    return None

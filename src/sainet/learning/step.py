@@ -14,7 +14,7 @@ from jax.sharding import NamedSharding, PartitionSpec
 from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch
-from sainet.engines.devices import BATCH, batch_mesh
+from sainet.engines.devices import BATCH, batch_mesh, is_one_gpu
 from sainet.learning.batches import predict_batch
 from sainet.learning.loss import LossWeights, push_losses, to_target
 from sainet.learning.recipes import Optimiser, Recipe
@@ -196,15 +196,39 @@ def make_step(
     """
     if recipe.objective.l2 is None:
         raise ValueError("l2 is None; call Objective.for_pushes first")
-    gradient, l2 = make_gradient(weights, recipe.horizon.hold), recipe.objective.l2
+    optimiser, l2, hold = recipe.optimiser, recipe.objective.l2, recipe.horizon.hold
+    if is_one_gpu():
+        return partial(_whole_step, start, weights, optimiser, l2, hold)
+    gradient = make_gradient(weights, hold)
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
         pushes = jnp.sum(batch.is_observed)
-        after = _update(state, start, summed, pushes, optimiser=recipe.optimiser, l2=l2)
+        after = _update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
         return after, total / pushes
 
     return step
+
+
+@partial(jax.jit, static_argnums=(2, 3, 4))
+def _whole_step(
+    start: Trained | None,
+    weights: LossWeights,
+    optimiser: Optimiser,
+    l2: float,
+    hold: int,
+    state: FitState,
+    batch: PushBatch,
+) -> tuple[FitState, Array]:
+    """Take a step in one program, so that a GPU never waits for the processor."""
+
+    def loss(layers: Trained) -> Array:
+        return data_loss(with_layers(state.network, layers), batch, weights, hold)
+
+    total, summed = jax.value_and_grad(loss)(trained_layers(state.network))
+    pushes = jnp.sum(batch.is_observed)
+    after = _update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
+    return after, total / pushes
 
 
 # Compiled once for each set of settings, for any number of networks.
