@@ -20,7 +20,7 @@ from learning.stores import (
 from sainet.datasets.batch import to_batch
 from sainet.datasets.schema import simulated_name
 from sainet.learning import fit as fit_module
-from sainet.learning import mixture as mixture_module
+from sainet.learning import sources as sources_module
 from sainet.learning.batches import predict_batch
 from sainet.learning.fit import STATE, fit
 from sainet.learning.log import LOG, LogLine, append_log, read_log, rewind_log
@@ -182,13 +182,13 @@ def test_memory_of_training_is_that_of_a_few_chunks(store, tmp_path, monkeypatch
     task = Task("sain", store, CONFIG, PLANAR)
     chunk = sum(a.nbytes for a in store.read(slice(0, 8), task.names).values())
     readers = []
-    reader = mixture_module.BatchReader
+    reader = sources_module.BatchReader
 
     def small(*args, **words):
         readers.append(reader(*args, **words, memory=chunk))
         return readers[-1]
 
-    monkeypatch.setattr(mixture_module, "BatchReader", small)
+    monkeypatch.setattr(sources_module, "BatchReader", small)
     monkeypatch.setattr(fit_module, "make_step", never_learns(1.0))
     fit("sain", store, CONFIG.changed(validation_share=0.0), tmp_path / "out")
     (used,) = readers

@@ -149,7 +149,9 @@ class Reproduce:
         self, at_once: int, steps: Sequence["Step[Any]"], expected: Mapping[str, float]
     ) -> Iterator["Runner"]:
         """Yield the runner of the steps, which runs several at once."""
+        from sainet.engines.devices import is_one_gpu
         from sainet.studies.durations import Clock
+        from sainet.studies.on_gpu import train_alike
         from sainet.studies.runner import MANY, Runner
         from sainet.studies.study import STEPS
 
@@ -163,7 +165,10 @@ class Reproduce:
             if machines.scheduler is not None:
                 yield Runner(folder, pool, bars, MANY, steps, clock)
             elif at_once == 1:
-                yield Runner(folder, pool, bars, clock=clock)
+                together = train_alike if is_one_gpu() else None
+                yield Runner(
+                    folder, pool, bars, ahead=steps, clock=clock, together=together
+                )
             else:  # while this process makes a table, the next step begins
                 yield Runner(folder, pool, bars, at_once + 1, steps, clock)
 

@@ -95,13 +95,26 @@ class BatchReader:
         """Stop reading ahead."""
         self._thread.shutdown(cancel_futures=True)
 
+    @property
+    def is_even(self) -> bool:
+        """Whether all pushes have as many steps."""
+        return len(np.unique(self._steps)) == 1
+
+    def whole(self) -> Arrays:
+        """Return the arrays of all pushes."""
+        return self._cache.gather(np.arange(self.store.info.pushes))
+
     def _read(self, iteration: int) -> tuple[Arrays, int]:
+        chosen = self.rows(iteration)
+        return self._cache.gather(chosen), int(self._steps[chosen[0]])
+
+    def rows(self, iteration: int) -> np.ndarray:
+        """Return the pushes of a batch."""
         epoch, place = 0, iteration
         while place >= len(self._order(epoch)):
             whole = len(self._order(epoch))
             epoch, place = epoch + place // whole, place % whole
-        chosen = self._order(epoch)[place]
-        return self._cache.gather(chosen), int(self._steps[chosen[0]])
+        return self._order(epoch)[place]
 
     def _batches_of_epoch(self, epoch: int) -> list[np.ndarray]:
         """Return the batches of an epoch: shuffled chunks, then shuffled pushes."""

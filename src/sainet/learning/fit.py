@@ -11,14 +11,14 @@ import msgspec
 import numpy as np
 from jaxtyping import Array
 
-from sainet.datasets.batch import PushBatch
 from sainet.datasets.groups import groups_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
 from sainet.learning.log import LogLine, append_log, read_log, rewind_log
 from sainet.learning.mixture import Batches, Mixture, Validate
 from sainet.learning.recipes import FROM_ENGINE, FromModel, Recipe, Start
-from sainet.learning.step import Best, FitState, make_step, trained_layers
+from sainet.learning.loss import LossWeights
+from sainet.learning.step import Best, FitState, Trained, make_step, trained_layers
 from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
@@ -35,7 +35,6 @@ from sainet.runs.manifest import MANIFEST, Manifest, manifest
 from sainet.scenes.recording import AGREES
 
 STATE = "state.safetensors"
-Step = Callable[[FitState, PushBatch], tuple[FitState, Array]]
 _log = logging.getLogger(__name__)
 
 
@@ -50,6 +49,45 @@ class FitResult:
     def loss(self) -> float | None:
         """The last logged loss of training; None without iterations."""
         return self.history[-1].loss if self.history else None
+
+
+@dataclass
+class Job:
+    """A training run that has begun: what it trains, and how far it is."""
+
+    mixture: Mixture
+    folder: RunFolder
+    progress: "Progress"
+    weights: list[LossWeights]  # of the loss, for each dataset
+    drawn_to: Trained | None  # layers that l2 draws towards; None is zero
+    validate: Validate | None
+
+    @property
+    def recipe(self) -> Recipe:
+        """How the network is trained."""
+        return self.mixture.lead.recipe
+
+    @property
+    def left(self) -> range:
+        """The iterations that are left."""
+        return range(
+            int(self.progress.state.iteration) + 1, self.mixture.lead.iterations + 1
+        )
+
+    def note(self, iteration: int, loss: Array) -> bool:
+        """Log and save where it is time to; return whether training ends early.
+
+        Raises:
+            Diverged: the loss is NaN or infinite.
+        """
+        progress, recipe, out = self.progress, self.recipe, self.folder.path
+        last = iteration == self.mixture.lead.iterations
+        if iteration % recipe.log_every == 0 or last:
+            _log_line(progress, iteration, float(loss), self.validate, out)
+        if iteration % recipe.checkpoint_every == 0 or last:
+            save_arrays(out / STATE, (progress.state, progress.best))
+        best, patience = progress.best, recipe.stopping.patience
+        return best is not None and best.is_stale(iteration, patience)
 
 
 def fit(
@@ -83,6 +121,37 @@ def fit(
         BadCheckpoint: training cannot start from that network.
         Diverged: the loss became NaN or infinite.
     """
+    job = begin(model, store, recipe, out, assumed_engine=assumed_engine)
+    if job is None:
+        _log.info("%s is already finished", out)
+        return FitResult(out, read_log(out))
+    complete(job, on_step)
+    return FitResult(out, tuple(job.progress.history))
+
+
+def complete(job: Job, on_step: Callable[[int, float | None], None]) -> None:
+    """Train a network to the end; see `fit`.
+
+    Raises:
+        Diverged: the loss became NaN or infinite.
+    """
+    _iterate(job, on_step)
+    finish(job)
+
+
+def begin(
+    model: ModelKind,
+    store: Store | Sequence[Store],
+    recipe: Recipe,
+    out: Path,
+    *,
+    assumed_engine: str | InternalEngine = "planar",
+) -> Job | None:
+    """Return a training run, at its start or where it was interrupted; see `fit`.
+
+    Returns:
+        None if it is finished.
+    """
     stores = (store,) if isinstance(store, Store) else tuple(store)
     if not stores:
         raise BadInput("`data` is empty; give at least one dataset.")
@@ -97,8 +166,7 @@ def fit(
     devices = jax.device_count()
     folder = open_run(out, mixture.settings(), finished_by=CARD, devices=devices)
     if folder.is_finished:
-        _log.info("%s is already finished", out)
-        return FitResult(out, read_log(out))
+        return None
     _warn_of_other_machine(folder, devices)
     state, weights = mixture.begin()
     is_fresh = existing is None and not mixture.lead.is_additive
@@ -111,10 +179,7 @@ def fit(
     # Match the step's output device: otherwise its second call compiles again.
     state = jax.device_put(state, jax.devices()[0])
     progress = Progress(state, best, list(history))
-    steps = [make_step(recipe, each, drawn_to) for each in weights]
-    _iterate(mixture, progress, steps, validate, out=out, on_step=on_step)
-    _finish(mixture, progress, folder)
-    return FitResult(out, tuple(progress.history))
+    return Job(mixture, folder, progress, weights, drawn_to, validate)
 
 
 def _existing(start: Start) -> Existing | None:
@@ -158,37 +223,29 @@ class Progress:
     history: list[LogLine]
 
     @property
+    def last_loss(self) -> float | None:
+        """The last logged loss; None before the first."""
+        return self.history[-1].loss if self.history else None
+
+    @property
     def network(self) -> AbstractNetwork:
         """The network with which training would end now."""
         network = self.state.result
         return network if self.best is None else self.best.put_into(network)
 
 
-def _iterate(
-    mixture: Mixture,
-    progress: Progress,
-    steps: Sequence[Step],
-    validate: Validate | None,
-    *,
-    out: Path,
-    on_step: Callable[[int, float | None], None],
-) -> None:
-    recipe, history = mixture.lead.recipe, progress.history
-    total = mixture.lead.iterations
-    batches = Batches(mixture)
+def _iterate(job: Job, on_step: Callable[[int, float | None], None]) -> None:
+    progress = job.progress
+    steps = [make_step(job.recipe, each, job.drawn_to) for each in job.weights]
+    batches = Batches(job.mixture)
     try:
-        for iteration in range(int(progress.state.iteration) + 1, total + 1):
+        for iteration in job.left:
             raise_if_interrupted()
             turn, batch = batches.take(iteration)
             progress.state, loss = steps[turn](progress.state, batch)
-            last = iteration == total
-            if iteration % recipe.log_every == 0 or last:
-                _log_line(progress, iteration, float(loss), validate, out)
-            if iteration % recipe.checkpoint_every == 0 or last:
-                save_arrays(out / STATE, (progress.state, progress.best))
-            on_step(iteration, history[-1].loss if history else None)
-            patience = recipe.stopping.patience
-            if progress.best and progress.best.is_stale(iteration, patience):
+            is_over = job.note(iteration, loss)
+            on_step(iteration, progress.last_loss)
+            if is_over:
                 break
     finally:
         batches.close()
@@ -216,7 +273,9 @@ def _log_line(
     progress.history.append(line)
 
 
-def _finish(mixture: Mixture, progress: Progress, folder: RunFolder) -> None:
+def finish(job: Job) -> None:
+    """Write the network and its card: its training run is finished."""
+    mixture, progress, folder = job.mixture, job.progress, job.folder
     task, history, counts = mixture.lead, progress.history, mixture.counts
     info, sain = task.store.info, task.model == "sain"
     data = save_arrays(folder.path / WEIGHTS, progress.network)
@@ -240,7 +299,7 @@ def _finish(mixture: Mixture, progress: Progress, folder: RunFolder) -> None:
         started_from=start.weights if start else None,
         recipe=task.recipe.settings(),
         manifest=read_document(folder.path / MANIFEST, Manifest),
-        final_loss=history[-1].loss if history else None,
+        final_loss=progress.last_loss,
     )
     write_document(folder.path / CARD, card)
     (folder.path / STATE).unlink(missing_ok=True)

@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import UInt64
 
 from sainet.datasets.batch import PushBatch
-from sainet.datasets.reader import BatchReader
 from sainet.datasets.store import Store
 from sainet.learning.checks import check_task
 from sainet.learning.loss import LossWeights
+from sainet.learning.sources import source_of
 from sainet.learning.step import FitState, data_loss, even_batch, first_state
 from sainet.learning.task import Task, first_network, settings, statistics
 from sainet.models.correctors.network import AbstractNetwork, Scales
@@ -158,25 +158,19 @@ class Batches:
         recipe, counts = mixture.lead.recipe, [s.info.pushes for s in mixture.stores]
         rng = np.random.default_rng([_TURN_STREAM, recipe.seed])
         share = np.array(counts) / sum(counts)
-        self._tasks = mixture.tasks
         total = mixture.lead.iterations
         self._turn = rng.choice(len(counts), total, p=share)
         same = self._turn[:, None] == np.arange(len(counts))
         self._place = np.cumsum(same, axis=0) - 1
-        size, seed = recipe.optimiser.batch_size, recipe.seed
-        self._readers = [
-            BatchReader(task.training, task.names, size, seed, complete=task.complete)
-            for task in mixture.tasks
-        ]
+        self._sources = [source_of(task) for task in mixture.tasks]
 
     def take(self, iteration: int) -> tuple[int, PushBatch]:
         """Return the index of a dataset, and its batch for an iteration (from 1)."""
         turn = int(self._turn[iteration - 1])
         place = int(self._place[iteration - 1, turn])
-        arrays = self._readers[turn].batch(place)
-        return turn, even_batch(self._tasks[turn].to_training_batch(*arrays, iteration))
+        return turn, even_batch(self._sources[turn].take(place, iteration))
 
     def close(self) -> None:
         """Stop reading ahead."""
-        for reader in self._readers:
-            reader.close()
+        for source in self._sources:
+            source.close()

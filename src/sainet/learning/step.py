@@ -198,7 +198,9 @@ def make_step(
         raise ValueError("l2 is None; call Objective.for_pushes first")
     optimiser, l2, hold = recipe.optimiser, recipe.objective.l2, recipe.horizon.hold
     if is_one_gpu():
-        return partial(_whole_step, start, weights, optimiser, l2, hold)
+        return lambda state, batch: _whole_step(
+            optimiser, hold, state, batch, weights, start, l2
+        )
     gradient = make_gradient(weights, hold)
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
@@ -210,15 +212,15 @@ def make_step(
     return step
 
 
-@partial(jax.jit, static_argnums=(2, 3, 4))
+@partial(jax.jit, static_argnums=(0, 1))
 def _whole_step(
-    start: Trained | None,
-    weights: LossWeights,
     optimiser: Optimiser,
-    l2: float,
     hold: int,
     state: FitState,
     batch: PushBatch,
+    weights: LossWeights,
+    start: Trained | None,
+    l2: float | Array,
 ) -> tuple[FitState, Array]:
     """Take a step in one program, so that a GPU never waits for the processor."""
 
@@ -231,8 +233,32 @@ def _whole_step(
     return after, total / pushes
 
 
-# Compiled once for each set of settings, for any number of networks.
-@partial(jax.jit, static_argnames=("optimiser", "l2"))
+class Side(eqx.Module):
+    """What one of several networks that train together has for itself."""
+
+    state: FitState
+    batch: PushBatch
+    weights: LossWeights
+    start: Trained | None  # layers that l2 draws towards
+    l2: Array
+
+
+@partial(jax.jit, static_argnums=(0, 1))
+def step_together(
+    optimiser: Optimiser, hold: int, sides: tuple[Side, ...]
+) -> tuple[tuple[FitState, Array], ...]:
+    """Return the next state of each of several networks, and its loss before that."""
+    one = jax.tree.map(lambda *parts: jnp.stack(parts), *sides)
+    after = jax.vmap(
+        lambda side: _whole_step(
+            optimiser, hold, side.state, side.batch, side.weights, side.start, side.l2
+        )
+    )(one)
+    return tuple(jax.tree.map(lambda x, i=i: x[i], after) for i in range(len(sides)))
+
+
+# Compiled once for each optimiser, for any number of networks.
+@partial(jax.jit, static_argnames=("optimiser",))
 def _update(
     state: FitState,
     start: Trained | None,
@@ -240,7 +266,7 @@ def _update(
     pushes: Array,
     *,
     optimiser: Optimiser,
-    l2: float,
+    l2: float | Array,
 ) -> FitState:
     """Take Adam's step along the mean gradient of so many pushes, l2 added."""
     layers = trained_layers(state.network)

@@ -127,7 +127,10 @@ class Task:
         horizon = self.recipe.horizon
         if iteration <= horizon.short_iterations:
             steps = min(steps, -(-horizon.steps // 4))
-        batch = self.to_batch(arrays, steps)
+        return self.augmented(self.to_batch(arrays, steps), iteration)
+
+    def augmented(self, batch: PushBatch, iteration: int) -> PushBatch:
+        """Return the batch of an iteration with some of its pushes mirrored, perhaps."""
         if not self.recipe.augmentation.mirror or self.features.has_place:
             return batch
         return mirror_some(batch, self.recipe.seed, iteration)

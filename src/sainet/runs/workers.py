@@ -134,6 +134,8 @@ def _signal(process: int, number: int) -> None:
 
 def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
     end_with_parent()
+    # A GPU belongs to the process that started this one.
+    os.environ["JAX_PLATFORMS"] = "cpu"
     if not cores.empty():  # holds one core per worker, or none
         os.sched_setaffinity(0, {cores.get()})
     # Background jobs of a shell ignore the signal, and so do their workers.

@@ -83,6 +83,9 @@ class Bar:
         self.report(Progress(self.title, done, self.total, note, left=left))
 
 
+Together = Callable[[Train, Iterable[Step[Any]], "Runner"], None]
+
+
 @dataclass
 class Runner:
     """Runs steps after their inputs; finished ones are not repeated.
@@ -97,6 +100,8 @@ class Runner:
     at_once: int = 0  # steps that the executor has at most; 0: steps run here
     ahead: Sequence[Step[Any]] = ()  # of which results will be asked for, in this order
     clock: Clock = field(default_factory=Clock)
+    # Trains, beside a network, those of further steps that are like it.
+    together: "Together | None" = None
     _results: dict[str, object] = field(default_factory=dict)
     _errors: dict[str, SainetError] = field(default_factory=dict)
     _running: dict[Future[Any], Step[Any]] = field(default_factory=dict)
@@ -138,6 +143,8 @@ class Runner:
 
     def _run_here(self, step: Step[Any]) -> None:
         with self.clock.time(step):
+            if self.together is not None and isinstance(step, Train):
+                self.together(step, self._unknown(step, *self.ahead), self)
             self._results[step.key] = step.run(self)
         make_room()
 

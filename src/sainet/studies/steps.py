@@ -18,7 +18,7 @@ from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join, pool_trainings
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.identification.identify import identify_into
-from sainet.learning.fit import fit
+from sainet.learning.fit import Job, begin, complete
 from sainet.learning.log import loss_note
 from sainet.learning.recipes import FromModel, Recipe
 from sainet.models.identity import ModelId
@@ -239,21 +239,25 @@ class Train(Apart[Model]):
             return self.recipe
         return self.recipe.changed(start=FromModel(str(runner.folder(self.start))))
 
-    def run(self, runner: "Runner") -> Model:
-        """Return the network, trained where that is unfinished."""
+    def begin(self, runner: "Runner") -> Job | None:
+        """Return the training run, begun or resumed; None if it is finished."""
         engine = self.id.simulator.slug if self.id.simulator else "planar"
         if self.identified is not None:
             engine = str(runner.folder(self.identified))
+        return begin(
+            "in" if self.id.kind == "in" else "sain",
+            self.stores(runner),
+            self.recipe_in(runner),
+            runner.folder(self),
+            assumed_engine=engine,
+        )
+
+    def run(self, runner: "Runner") -> Model:
+        """Return the network, trained where that is unfinished."""
         with runner.bar(f"Training {self.name}", self.iterations) as bar:
-            result = fit(
-                "in" if self.id.kind == "in" else "sain",
-                self.stores(runner),
-                self.recipe_in(runner),
-                runner.folder(self),
-                assumed_engine=engine,
-                on_step=lambda done, loss: bar.reach(done, loss_note(loss)),
-            )
-            bar.reach(self.iterations, loss_note(result.loss))
+            if job := self.begin(runner):
+                complete(job, lambda done, loss: bar.reach(done, loss_note(loss)))
+            bar.reach(self.iterations, bar.note)
         return replace(load_model(str(runner.folder(self))), id=self.id)
 
 

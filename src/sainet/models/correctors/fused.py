@@ -174,7 +174,9 @@ def _given(
         return _to_blocks(each, rows=2)
 
     pair_rest, body_rest = jax.vmap(
-        lambda now: _rests(network, Moment(jnp.zeros_like(start), fixed, in_columns(now)))
+        lambda now: _rests(
+            network, Moment(jnp.zeros_like(start), fixed, in_columns(now))
+        )
     )(times)
     reach = fixed.radius + fixed.pusher_radius[None]
     return Given(

@@ -194,7 +194,9 @@ def _step(
     return _Inputs(tuple(rel), tuple(dyn), effect), after
 
 
-def _apply(weights: Ref, biases: Ref, x: Array, before: Array | None = None) -> list[Array]:
+def _apply(
+    weights: Ref, biases: Ref, x: Array, before: Array | None = None
+) -> list[Array]:
     """Return the inputs of all layers, then the output; `before` is added to the first."""
     found = [x]
     for index, (weight, bias) in enumerate(zip(weights, biases, strict=True)):
@@ -400,7 +402,10 @@ def _call(
     given = next(part for part in inputs if isinstance(part, Given))
 
     def whole(*refs: Ref) -> None:
-        kernel(*refs[: len(inputs)], jax.tree.unflatten(treedef, jax.tree.leaves(refs[len(inputs) :])))
+        kernel(
+            *refs[: len(inputs)],
+            jax.tree.unflatten(treedef, jax.tree.leaves(refs[len(inputs) :])),
+        )
 
     treedef = jax.tree.structure(out)
     return pl.pallas_call(

@@ -1,0 +1,101 @@
+"""Several networks that train at once on a GPU, which one alone leaves mostly idle."""
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from sainet.learning.fit import Job, finish
+from sainet.learning.mixture import Batches
+from sainet.learning.step import FitState, Side, step_together
+from sainet.runs.errors import Diverged
+from sainet.runs.interrupts import raise_if_interrupted
+
+
+def fit_together(
+    jobs: Sequence[Job],
+    on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
+) -> None:
+    """Train networks at once where they are alike, and finish their runs.
+
+    Each becomes what it would have become alone, except in its last bits. A job whose
+    loss diverges is left as it is, so that it reports its error when it runs alone.
+
+    Args:
+        jobs: each of one dataset. They are alike if their networks and batches have
+            the same form, and their optimisers are the same.
+        on_step: called with the finished iterations of each, and a last logged loss.
+    """
+    for alike in _alike(jobs):
+        _iterate(alike, on_step)
+
+
+def _alike(jobs: Sequence[Job]) -> Iterator[list["_Member"]]:
+    members = [(member.form, member) for member in map(_Member, jobs)]
+    members.sort(key=lambda each: hash(each[0]))
+    for _, group in groupby(members, key=itemgetter(0)):
+        yield [member for _, member in group]
+
+
+class _Member:
+    """A job, its batches, and what its steps need for themselves."""
+
+    def __init__(self, job: Job) -> None:
+        self.job, self._batches = job, Batches(job.mixture)
+        self._l2 = jnp.float32(job.recipe.objective.l2)
+
+    @property
+    def form(self) -> tuple[object, ...]:
+        """What members have in common that train together."""
+        side, recipe = self.side(self.job.left.start), self.job.recipe
+        shapes = [(x.shape, x.dtype) for x in jax.tree.leaves(side)]
+        settings = recipe.optimiser, recipe.horizon, self.job.left
+        return (*settings, jax.tree.structure(side), tuple(shapes))
+
+    def side(self, iteration: int) -> Side:
+        """Return the state, and the inputs of an iteration."""
+        job = self.job
+        _, batch = self._batches.take(iteration)
+        weights = job.weights[0]
+        return Side(job.progress.state, batch, weights, job.drawn_to, self._l2)
+
+    def close(self) -> None:
+        """Stop reading."""
+        self._batches.close()
+
+
+def _iterate(
+    members: list[_Member], on_step: Callable[[int, float | None], None]
+) -> None:
+    recipe, left = members[0].job.recipe, members[0].job.left
+    try:
+        for iteration in left:
+            raise_if_interrupted()
+            sides = tuple(member.side(iteration) for member in members)
+            found = step_together(recipe.optimiser, recipe.horizon.hold, sides)
+            members = list(_noted(members, iteration, found))
+            if not members:
+                return
+            on_step(iteration, members[0].job.progress.last_loss)
+    finally:
+        for member in members:
+            member.close()
+    for member in members:
+        finish(member.job)
+
+
+def _noted(
+    members: Sequence[_Member], iteration: int, found: Sequence[tuple[FitState, Array]]
+) -> Iterator[_Member]:
+    """Yield the members that go on."""
+    for member, (state, loss) in zip(members, found, strict=True):
+        member.job.progress.state = state
+        try:
+            member.job.note(iteration, loss)
+        except Diverged:
+            member.close()
+            continue
+        yield member
