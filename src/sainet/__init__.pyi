@@ -1,5 +1,6 @@
 """The public names and their homes, for type checkers and for `__init__.py`."""
 
+from sainet.api.abstention import abstaining as abstaining
 from sainet.api.benchmark import Entry as Entry
 from sainet.api.benchmark import Track as Track
 from sainet.api.benchmark import score as score

@@ -67,6 +67,14 @@ def test_a_claim_without_p_keeps_its_verdict():
     assert found[1].p is None
 
 
+def test_a_bound_that_no_chance_decides_does_not_count():
+    claims = [claim("holds", 0.04), claim("holds", 0.02), claim("holds", 0.03)]
+    bound = Claim("a bound", lambda summary: Verdict("holds", (SEEN,), is_test=False))
+    found = rule_on([*claims, bound], NOTHING)
+    assert found[:3] == rule_on(claims, NOTHING)
+    assert found[3].status == "holds"
+
+
 @pytest.mark.parametrize("shift", [0.0, 0.1, 0.25])
 def test_p_of_a_paired_difference_is_that_of_the_t_test(shift):
     rng = np.random.default_rng(1)

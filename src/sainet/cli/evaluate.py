@@ -38,6 +38,9 @@ class Evaluate:
     engine of their training."""
     force: bool = False
     """Skip data and engine compatibility checks."""
+    abstain: bool = False
+    """Second row for each model that names the groups it was fitted to: on other
+    surfaces physics predicts in its place. Adds physics, too."""
     table: Path | None = None
     """File for the table: .md, .html, .tex or .csv. Default: none."""
     page: Path | None = None
@@ -62,20 +65,18 @@ class Evaluate:
             require_one_of("page", self.page.suffix, (".html",))
         use_devices(self.devices)
         from sainet.datasets.store import open_part
+        from sainet.evaluation.abstention import measure, with_abstaining
         from sainet.evaluation.as_json import to_json_object
         from sainet.evaluation.coverage import coverage_of, in_words, to_json
         from sainet.evaluation.summary import summarise
         from sainet.evaluation.unlike import unlike_pushes
-        from sainet.models.library import load_model
         from sainet.planning.checks import doubts_of_count
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table, write_table
 
         store = open_part(self.data, self.group)
-        names = self.model or self._fitting(store)
-        models = [
-            load_model(name, engine=self.engine, force=self.force) for name in names
-        ]
+        models = self._load(store)
+        rows = with_abstaining(models) if self.abstain else models
         for warning in unlike_pushes(models, store):
             self.output.warn(warning)
         for model in models:
@@ -83,7 +84,7 @@ class Evaluate:
                 self.output.warn(f"{model.name}: {doubt}.")
         if self.shard is not None:
             return self._measure_share(models, store, Shard.parse(self.shard))
-        measured = self._measure(models, store)
+        measured = measure(rows, store, lambda plain: self._measure(plain, store))
         summary = summarise(measured)
         print_table(arrange(summary), self.output.console)
         covered = coverage_of(measured)
@@ -93,6 +94,18 @@ class Evaluate:
             write_table(arrange(summary), self.table)
         self._write_page(models, store, measured)
         return to_json_object(summary) | to_json(covered)
+
+    def _load(self, store: "Store") -> "list[Model]":
+        """Return the models; physics is one of them if some may abstain."""
+        from sainet.evaluation.summary import BASELINE
+        from sainet.models.library import load_model
+
+        names = [*(self.model or self._fitting(store))]
+        if self.abstain and BASELINE not in names:
+            names.insert(0, BASELINE)
+        return [
+            load_model(name, engine=self.engine, force=self.force) for name in names
+        ]
 
     def _write_page(
         self, models: "list[Model]", store: "Store", measured: "Measurements"

@@ -1,10 +1,22 @@
-"""Groups of recorded pushes: those of one surface and speed, as they were imported."""
+"""Groups of recorded pushes: those of one surface and speed, as they were imported.
 
+The name of a group is that of its surface, a hyphen and a speed: ``abs-10``. A name
+without a number at its end is that of a surface.
+"""
+
+import re
 from collections.abc import Iterable
 
 import numpy as np
 
 from sainet.datasets.store import Store
+
+_SPEED = re.compile(r"-\d+(\.\d+)?\Z")
+
+
+def surface_of(group: str) -> str:
+    """Return the surface of a group: ``abs`` of ``abs-10``."""
+    return _SPEED.sub("", group) or group
 
 
 def groups_of(stores: Iterable[Store]) -> tuple[str, ...]:

@@ -27,12 +27,15 @@ class Verdict:
         comparisons: all comparisons that it rests on.
         contradicting: those of them that contradict the claim.
         p: two-sided, that chance alone makes the claim hold; None: the rule has none.
+        is_test: whether chance can make the claim hold, so that it counts where others
+            are corrected for their number.
     """
 
     status: Status
     comparisons: tuple[Comparison, ...] = ()
     contradicting: tuple[Comparison, ...] = ()
     p: float | None = None
+    is_test: bool = True
 
 
 Rule = Callable[[Summary], Verdict]
@@ -223,8 +226,12 @@ class Comparative:
 
 def best_network(summary: Summary, condition: str) -> Comparative | None:
     """Return the best model of a condition that is not the engine as it is."""
-    factors = [each for each in summary.factors if each.condition == condition]
     ids = {model.slug: model for model in summary.models}
+    factors = [
+        each
+        for each in summary.factors
+        if each.condition == condition and not ids[each.model].abstains
+    ]
     by_model = {each.model: each for each in factors}
     networks = [
         each for each in factors if ids[each.model].kind not in ("physics", "published")

@@ -7,7 +7,7 @@ names the models, the conditions and the provenance.
 
 import io
 import lzma
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -189,6 +189,13 @@ class Measurements:
         return Measurements(
             data, msgspec.structs.replace(self.header, conditions=conditions)
         )
+
+    def of_models(self, slugs: Sequence[str]) -> "Measurements":
+        """Return the measurements of some models, in their order."""
+        kept = [self.slugs.index(slug) for slug in slugs]
+        models = tuple(self.header.models[number] for number in kept)
+        header = msgspec.structs.replace(self.header, models=models)
+        return Measurements(self.data.isel(model=kept), header)
 
     def made_by(self, *command: str) -> "Measurements":
         """Return the same measurements with a command and this machine as origin."""

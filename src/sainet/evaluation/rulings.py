@@ -40,7 +40,7 @@ def rule_on(claims: Sequence[Claim], summary: Summary) -> tuple[Ruled, ...]:
     verdicts = [claim.rule(summary) for claim in claims]
     secondary = [v.p for v in verdicts[1:] if v.p is not None]
     # A claim that does not hold counts too: it was tested.
-    tested = sum(v.status != "not testable here" for v in verdicts[1:])
+    tested = sum(v.is_test and v.status != "not testable here" for v in verdicts[1:])
     corrected = iter(holm(secondary, tested))
     found: list[Ruled] = []
     for number, (claim, verdict) in enumerate(zip(claims, verdicts, strict=True)):

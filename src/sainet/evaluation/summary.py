@@ -95,8 +95,8 @@ def summarise(measured: measurements.Measurements, *, subject: str = "") -> Summ
 
     Args:
         measured: pushes or trials.
-        subject: slug of the model that all others are compared with; by default every
-            model is compared with every other.
+        subject: slug of the model that all others are compared with, as models that
+            abstain are with the engine; by default every model is with every other.
     """
     header = measured.header
     found = Summary(
@@ -152,7 +152,9 @@ def _pairs(measured: measurements.Measurements, subject: str) -> list[tuple[str,
     ours = [slug for slug in measured.slugs if slug not in predictions]
     if subject:
         others = [slug for slug in (*ours, *predictions) if slug != subject]
-        return [(subject, other) for other in others]
+        abstaining = [m.slug for m in measured.header.models if m.abstains]
+        beside = [(slug, BASELINE) for slug in abstaining if BASELINE in others]
+        return [*((subject, other) for other in others), *beside]
     return [(other, one) for one, other in combinations(ours, 2)]
 
 

@@ -51,7 +51,7 @@ def other_groups(models: Iterable[Model], groups: Sequence[str]) -> Iterator[str
         groups: of the test pushes.
     """
     for model in models:
-        known = (model.card.groups or ()) if model.card else ()
+        known = model.groups if model.card else ()
         if known and (others := sorted(set(groups) - set(known))):
             yield (
                 f"{model.name}: fitted to pushes of {', '.join(known)}, but these are "

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-from msgspec import to_builtins
+from msgspec import UNSET, to_builtins
 from scipy.optimize import least_squares
 
+from sainet.datasets.groups import groups_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import SimulatorSpec
 from sainet.identification.parameters import (
@@ -184,6 +185,7 @@ def identify(
         before_deg=before[1],
         after_deg=after[1],
         digests=digests_to_text(store.push_hashes()),
+        groups=groups_of([store]) or UNSET,
     )
 
 

@@ -128,7 +128,7 @@ def read_card(folder: Path) -> Card:
     return read_document(path, Card, error=BadCheckpoint, remedy="train it again")
 
 
-_INTERNAL = ("digests", "engine", "format_version")
+_INTERNAL = ("digests", "engine", "format_version", "groups")
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -157,6 +157,7 @@ class Identified(msgspec.Struct, frozen=True, kw_only=True):
     before_deg: Size  # mean rotation error
     after_deg: Size
     digests: str = ""  # of the pushes (`runs.digests`); empty: of an earlier version
+    groups: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET  # of recorded pushes
     format_version: Literal[2] = 2
 
     def to_json(self) -> dict[str, object]:

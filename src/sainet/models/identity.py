@@ -42,6 +42,7 @@ Variant = Literal[
 NETWORKS = get_args(ModelKind)
 LEARNED = (*NETWORKS, "gp")
 _KINDS = {"physics": "Physics", "in": "IN", "sain": "SAIN", "gp": "Gaussian process"}
+_ABSTAINING = "abstaining"
 _FEEDFORWARD = {"in": "Feedforward", "sain": "SA feedforward"}
 _VARIANTS = {
     "single-steps": "single steps",
@@ -71,6 +72,22 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     features: Features | ProcessFeatures = "paper"
     variant: Variant = ""
     name: str = ""  # given by a user or publication; replaces the computed names
+    # Whether an engine predicts in its place on surfaces that it was not fitted to.
+    abstains: Literal[True] | msgspec.UnsetType = msgspec.UNSET
+
+    def __repr__(self) -> str:
+        """Return the fields; without `abstains` where unset, as before it existed.
+
+        Representations name the run folders of studies, which then stay the same.
+        """
+        shown = self.__struct_fields__[: None if self.abstains else -1]
+        return f"ModelId({', '.join(f'{k}={getattr(self, k)!r}' for k in shown)})"
+
+    @property
+    def abstaining(self) -> "ModelId":
+        """The identity of the model that abstains on other surfaces."""
+        name = self.name and f"{self.name}-{_ABSTAINING}"
+        return msgspec.structs.replace(self, name=name, abstains=True)
 
     @property
     def slug(self) -> str:
@@ -97,6 +114,7 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
             "" if self.data == "paper" else self.data,
             "" if self.features == "paper" else self.features,
             self.variant,
+            _ABSTAINING if self.abstains else "",
         ]
 
     def _simulator_part(self) -> str:

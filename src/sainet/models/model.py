@@ -50,6 +50,12 @@ class Model:
         """The name in tables and JSON."""
         return self.id.slug
 
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The groups of recorded pushes that it was fitted to; empty if not known."""
+        source = self.card or self.identified
+        return (source.groups or ()) if source else ()
+
     def called(self, name: str) -> "Model":
         """Return the model under another name in tables and JSON."""
         if self.name == name:

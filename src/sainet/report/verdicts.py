@@ -83,10 +83,12 @@ def _worth_showing(summary: Summary, shown: set[str]) -> list[Comparison]:
     """Return the comparisons that a reader needs; the JSON contains all.
 
     Beside true-property physics a comparison with physics adds little, and the end of
-    a push repeats its mean; where nothing else was compared, these are kept.
+    a push repeats its mean; where nothing else was compared, these are kept. A model
+    that abstains predicts like another one, which has a comparison of its own.
     """
-    hidden = "" if TRUE_PROPERTIES in shown else TRUE_PROPERTIES
-    every = [e for e in summary.comparisons if hidden not in (e.model, e.against)]
+    hidden = {model.slug for model in summary.models if model.abstains}
+    hidden |= {TRUE_PROPERTIES} - shown
+    every = [e for e in summary.comparisons if not hidden & {e.model, e.against}]
     less = BASELINE if TRUE_PROPERTIES in shown else ""
     steps = [each for each in every if not METRICS[each.metric].is_of_end]
     return [each for each in steps if each.against != less] or steps or every

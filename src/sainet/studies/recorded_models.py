@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Int
 
+from sainet.datasets.groups import surface_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS, Assumptions, PlanarSpec
 from sainet.learning.recipes import FINE_TUNING, RESIDUAL, Fresh, FromModel
@@ -57,9 +58,8 @@ class Variant:
 
 
 def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
-    """Return the pushes on each surface; a group is surface and speed: ``abs-10``."""
-    known = [name.rpartition("-")[0] or name for name in store.info.groups]
-    groups = known or ["recorded"]
+    """Return the pushes on each surface."""
+    groups = [surface_of(name) for name in store.info.groups] or ["recorded"]
     owner = np.array(groups)[store.read(slice(None), ("group",))["group"]]
     present = set(owner.tolist())
     names = (name for name in dict.fromkeys(groups) if name in present)
