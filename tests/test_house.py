@@ -294,6 +294,12 @@ ENGINEER = (
     "report/pages/inspection",
 )
 SCREENING = ("planning/screening", "bench/screening")
+ON_GPU = (
+    "models/correctors/fused",
+    "learning/sources",
+    "learning/together",
+    "studies/on_gpu",
+)
 # With lines that stood in studies/demo.py before.
 PAGE_OF_EVALUATION = ("report/replays", "report/pages/evaluation")
 
@@ -313,6 +319,7 @@ LATER = ADDED + modules_of(
     + ENGINEER
     + PAGE_OF_EVALUATION
     + SCREENING
+    + ON_GPU
     + ENSEMBLES
     + ANY_NUMBER
     + WHOLE_PAPER
@@ -422,6 +429,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(SCREENING))),
         135,
         135,
+    ),
+    "code lines of training on a GPU": (
+        lambda: sum(map(code_lines, modules_of(ON_GPU))),
+        540,
+        540,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

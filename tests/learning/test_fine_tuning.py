@@ -19,7 +19,7 @@ from sainet.learning.recipes import (
     FromModel,
     FromSimulator,
 )
-from sainet.learning.step import Best, trained_layers
+from sainet.learning.state import Best, trained_layers
 from sainet.learning.task import Existing, Task
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network

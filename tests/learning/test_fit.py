@@ -22,7 +22,8 @@ from sainet.datasets.schema import simulated_name
 from sainet.learning import fit as fit_module
 from sainet.learning import sources as sources_module
 from sainet.learning.batches import predict_batch
-from sainet.learning.fit import STATE, fit
+from sainet.learning.fit import fit
+from sainet.learning.job import STATE
 from sainet.learning.log import LOG, LogLine, append_log, read_log, rewind_log
 from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import PAPER

@@ -9,7 +9,8 @@ import pytest
 from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
 from sainet.learning import fit as fit_module
-from sainet.learning.fit import STATE, fit
+from sainet.learning.fit import fit
+from sainet.learning.job import STATE
 from sainet.learning.mixture import Batches, Mixture, pool
 from sainet.learning.recipes import CONTACT, PAPER, FromModel
 from sainet.learning.task import Task

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from learning.stores import quiet_store
-from sainet.learning.fit import STATE
+from sainet.learning.job import STATE
 from sainet.learning.log import LOG
 from sainet.models.card import CARD, WEIGHTS
 from support import SOURCE

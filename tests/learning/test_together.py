@@ -10,7 +10,8 @@ import pytest
 from learning.stores import quiet_store
 from sainet.learning import sources as sources_module
 from sainet.learning import together as together_module
-from sainet.learning.fit import STATE, begin, fit
+from sainet.learning.fit import fit
+from sainet.learning.job import STATE, begin
 from sainet.learning.log import read_log
 from sainet.learning.mixture import Batches
 from sainet.learning.recipes import PAPER

@@ -137,6 +137,6 @@ def _unroll(
     if isinstance(network.integrator, RelaxingResidual) and hold > 1:
         return partial(unroll_held, hold=hold)
     if is_one_gpu():
-        fused = import_module("sainet.models.correctors.fused")  # imports Pallas
+        fused = import_module("sainet.models.correctors.fused.unroll")  # imports Pallas
         return fused.unroll_fused if fused.fits(network, disks) else None
     return None

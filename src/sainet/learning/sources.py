@@ -1,4 +1,4 @@
-"""Where the batches of a training job come from: its dataset, or the memory of a GPU."""
+"""Where the batches of a job come from: its dataset, or the memory of a GPU."""
 
 from abc import ABC, abstractmethod
 

@@ -2,89 +2,30 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optax
 from jax import lax
 from jax.flatten_util import ravel_pytree
 from jax.sharding import NamedSharding, PartitionSpec
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array
 
 from sainet.datasets.batch import PushBatch
 from sainet.engines.devices import BATCH, batch_mesh, is_one_gpu
 from sainet.learning.batches import predict_batch
 from sainet.learning.loss import LossWeights, push_losses, to_target
 from sainet.learning.recipes import Optimiser, Recipe
+from sainet.learning.state import (
+    FitState,
+    Trained,
+    trained_layers,
+    update,
+    with_layers,
+)
 from sainet.models.correctors.network import AbstractNetwork
 
-_MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
 _MICROBATCH = 500  # pushes at a time: 20,000 single steps would leave the cache
-
-Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
-
-
-class FitState(eqx.Module):
-    """Everything that changes while training: enough to resume, bit for bit."""
-
-    network: AbstractNetwork
-    optimizer: Any
-    iteration: Array
-    average: Trained | None = None  # of the layers, if the recipe averages
-
-    @property
-    def result(self) -> AbstractNetwork:
-        """The network with which training would end now."""
-        if self.average is None:
-            return self.network
-        return with_layers(self.network, self.average)
-
-
-def make_optimizer(optimiser: Optimiser) -> optax.GradientTransformation:
-    """Return Adam with a falling learning rate, guarded against exploding steps."""
-    schedule = _schedule(optimiser)
-    chain = optax.chain(
-        optax.clip_by_global_norm(optimiser.clip_norm), optax.adam(schedule)
-    )
-    return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
-
-
-def _schedule(optimiser: Optimiser) -> optax.Schedule:
-    """Return the learning rate by the number of iterations so far."""
-    first = optimiser.learning_rate
-    if optimiser.decay == "cosine":
-        return optax.cosine_decay_schedule(first, optimiser.iterations)
-    return optax.exponential_decay(first, optimiser.halve_every, 0.5, staircase=True)
-
-
-def trained_layers(network: AbstractNetwork) -> Trained:
-    """Return the part of a network that is trained: all except its scales."""
-    return network.trained
-
-
-def with_layers(network: AbstractNetwork, layers: Trained) -> AbstractNetwork:
-    """Return the network with other weights."""
-    return eqx.tree_at(trained_layers, network, layers)
-
-
-def first_state(network: AbstractNetwork, optimiser: Optimiser) -> FitState:
-    """Return the state before the first iteration."""
-    layers = trained_layers(network)
-    moments = make_optimizer(optimiser).init(layers)
-    average = layers if optimiser.average else None
-    return FitState(network, moments, jnp.zeros((), jnp.int32), average)
-
-
-def _averaged(average: Trained, layers: Trained, span: int, done: Array) -> Trained:
-    """Return the exponential mean, over a shorter span in the first iterations.
-
-    The first weights must not stay in it for long: the share of the new weights is that
-    of TensorFlow's `ExponentialMovingAverage` with `num_updates`.
-    """
-    share = jnp.maximum(1 / span, 9 / (10 + done))
-    return optax.incremental_update(layers, average, share)
 
 
 def data_loss(
@@ -198,43 +139,22 @@ def make_step(
         raise ValueError("l2 is None; call Objective.for_pushes first")
     optimiser, l2, hold = recipe.optimiser, recipe.objective.l2, recipe.horizon.hold
     if is_one_gpu():
-        return lambda state, batch: _whole_step(
-            optimiser, hold, state, batch, weights, start, l2
+        return lambda state, batch: step_in_one(
+            optimiser, hold, Side(state, batch, weights, start, jnp.float32(l2))
         )
     gradient = make_gradient(weights, hold)
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
         pushes = jnp.sum(batch.is_observed)
-        after = _update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
+        after = update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
         return after, total / pushes
 
     return step
 
 
-@partial(jax.jit, static_argnums=(0, 1))
-def _whole_step(
-    optimiser: Optimiser,
-    hold: int,
-    state: FitState,
-    batch: PushBatch,
-    weights: LossWeights,
-    start: Trained | None,
-    l2: float | Array,
-) -> tuple[FitState, Array]:
-    """Take a step in one program, so that a GPU never waits for the processor."""
-
-    def loss(layers: Trained) -> Array:
-        return data_loss(with_layers(state.network, layers), batch, weights, hold)
-
-    total, summed = jax.value_and_grad(loss)(trained_layers(state.network))
-    pushes = jnp.sum(batch.is_observed)
-    after = _update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
-    return after, total / pushes
-
-
 class Side(eqx.Module):
-    """What one of several networks that train together has for itself."""
+    """What a step of a network takes: its state and batch, and its own settings."""
 
     state: FitState
     batch: PushBatch
@@ -244,41 +164,33 @@ class Side(eqx.Module):
 
 
 @partial(jax.jit, static_argnums=(0, 1))
+def step_in_one(optimiser: Optimiser, hold: int, side: Side) -> tuple[FitState, Array]:
+    """Take a step in one program, so that a GPU never waits for the processor.
+
+    Returns:
+        The next state and the mean loss of the pushes without l2.
+    """
+    network, batch = side.state.network, side.batch
+
+    def loss(layers: Trained) -> Array:
+        return data_loss(with_layers(network, layers), batch, side.weights, hold)
+
+    total, summed = jax.value_and_grad(loss)(trained_layers(network))
+    pushes = jnp.sum(batch.is_observed)
+    after = update(
+        side.state, side.start, summed, pushes, optimiser=optimiser, l2=side.l2
+    )
+    return after, total / pushes
+
+
+@partial(jax.jit, static_argnums=(0, 1))
 def step_together(
     optimiser: Optimiser, hold: int, sides: tuple[Side, ...]
 ) -> tuple[tuple[FitState, Array], ...]:
-    """Return the next state of each of several networks, and its loss before that."""
+    """Return what `step_in_one` returns for each of several networks."""
     one = jax.tree.map(lambda *parts: jnp.stack(parts), *sides)
-    after = jax.vmap(
-        lambda side: _whole_step(
-            optimiser, hold, side.state, side.batch, side.weights, side.start, side.l2
-        )
-    )(one)
+    after = jax.vmap(partial(step_in_one, optimiser, hold))(one)
     return tuple(jax.tree.map(lambda x, i=i: x[i], after) for i in range(len(sides)))
-
-
-# Compiled once for each optimiser, for any number of networks.
-@partial(jax.jit, static_argnames=("optimiser",))
-def _update(
-    state: FitState,
-    start: Trained | None,
-    summed: Trained,
-    pushes: Array,
-    *,
-    optimiser: Optimiser,
-    l2: float | Array,
-) -> FitState:
-    """Take Adam's step along the mean gradient of so many pushes, l2 added."""
-    layers = trained_layers(state.network)
-    change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
-    mean = jax.tree.map(lambda g, w: g / pushes + 2 * l2 * w, summed, change)
-    updates, moments = make_optimizer(optimiser).update(mean, state.optimizer, layers)
-    layers = optax.apply_updates(layers, updates)
-    average = state.average
-    if average is not None:
-        average = _averaged(average, layers, optimiser.average, state.iteration)
-    network = with_layers(state.network, layers)
-    return FitState(network, moments, state.iteration + 1, average)
 
 
 def even_batch(batch: PushBatch) -> PushBatch:
@@ -296,32 +208,3 @@ def even_batch(batch: PushBatch) -> PushBatch:
         padded,
         (padded.pose_observed & real[:, None], padded.rate_observed & real[:, None]),
     )
-
-
-class Best(eqx.Module):
-    """Its layers, and when and how good it was; part of a checkpoint."""
-
-    layers: Trained
-    loss: Float[Array, ""]  # on the validation pushes
-    iteration: Int[Array, ""]
-
-    @staticmethod
-    def first(network: AbstractNetwork, loss: float) -> "Best":
-        """Return the network that training begins with: it may remain the best."""
-        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(0))
-
-    def or_better(
-        self, network: AbstractNetwork, loss: float, iteration: int
-    ) -> "Best":
-        """Return the better one of this and another network."""
-        if not loss < float(self.loss):
-            return self
-        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(iteration))
-
-    def is_stale(self, iteration: int, patience: int) -> bool:
-        """Return whether nothing has become better for so many iterations."""
-        return 0 < patience <= iteration - int(self.iteration)
-
-    def put_into(self, network: AbstractNetwork) -> AbstractNetwork:
-        """Return the network with the best layers."""
-        return with_layers(network, self.layers)

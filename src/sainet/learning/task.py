@@ -130,7 +130,7 @@ class Task:
         return self.augmented(self.to_batch(arrays, steps), iteration)
 
     def augmented(self, batch: PushBatch, iteration: int) -> PushBatch:
-        """Return the batch of an iteration with some of its pushes mirrored, perhaps."""
+        """Return the batch of an iteration, some of it mirrored by the recipe."""
         if not self.recipe.augmentation.mirror or self.features.has_place:
             return batch
         return mirror_some(batch, self.recipe.seed, iteration)

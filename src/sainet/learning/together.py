@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from sainet.learning.fit import Job, finish
+from sainet.learning.job import Job, finish
 from sainet.learning.mixture import Batches
-from sainet.learning.step import FitState, Side, step_together
+from sainet.learning.state import FitState
+from sainet.learning.step import Side, step_together
 from sainet.runs.errors import Diverged
 from sainet.runs.interrupts import raise_if_interrupted
 

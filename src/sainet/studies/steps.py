@@ -18,7 +18,8 @@ from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join, pool_trainings
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.identification.identify import identify_into
-from sainet.learning.fit import Job, begin, complete
+from sainet.learning.fit import complete
+from sainet.learning.job import Job, begin
 from sainet.learning.log import loss_note
 from sainet.learning.recipes import FromModel, Recipe
 from sainet.models.identity import ModelId
@@ -241,9 +242,8 @@ class Train(Apart[Model]):
 
     def begin(self, runner: "Runner") -> Job | None:
         """Return the training run, begun or resumed; None if it is finished."""
-        engine = self.id.simulator.slug if self.id.simulator else "planar"
-        if self.identified is not None:
-            engine = str(runner.folder(self.identified))
+        named = self.id.simulator.slug if self.id.simulator else "planar"
+        engine = str(runner.folder(self.identified)) if self.identified else named
         return begin(
             "in" if self.id.kind == "in" else "sain",
             self.stores(runner),
@@ -262,10 +262,7 @@ class Train(Apart[Model]):
 
 
 class Evaluate(Apart[Measurements]):
-    """Errors of models on the same pushes.
-
-    Models of one identity are training runs of one network.
-    """
+    """Errors of models; those of one identity are training runs of one network."""
 
     models: tuple[Step[Model], ...]
     pushes: Step[Store]

@@ -1,4 +1,7 @@
-"""Recurrent predictions of IN and SAIN in the kernels of a GPU (see `kernels`)."""
+"""From networks to kernels: the inputs of IN and SAIN are affine in the motion.
+
+All but the gap between pusher and disk, which has a term of its own.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -9,8 +12,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sainet.models.blocks import PathAction
-from sainet.models.correctors.interaction import InteractionNetwork
-from sainet.models.correctors.kernels import (
+from sainet.models.correctors.fused.kernels import Problem, predict
+from sainet.models.correctors.fused.layout import (
     COLUMNS,
     DISKS,
     PUSHES,
@@ -19,9 +22,10 @@ from sainet.models.correctors.kernels import (
     Maps,
     Path,
     Settings,
+    Times,
     Weights,
-    predict,
 )
+from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.features import FeatureSet
 from sainet.models.inputs import Drive, Moment, Still, in_columns
@@ -63,8 +67,8 @@ def unroll_fused(
     """
     del before
     settings = Settings(network.features.are_standardised, interpret)
-    given = _given(network, initial, still, drive)
-    path = predict(settings, _maps(network), given, _weights(network))
+    problem = _problem(network, initial, still, drive)
+    path: Path = predict(settings, problem, _weights(network))  # pyright: ignore[reportAssignmentType]
     return _from_blocks(path)[:, : initial.shape[0]]
 
 
@@ -134,14 +138,17 @@ def _maps(network: InteractionNetwork) -> Maps:
         own, other = own / pair, other / pair
         body, added, gap = body / each, added / each, gap / each
     rate = step * jnp.diag(scales.acceleration)
-    sides = added[:, 0:1], added[:, 1:2], gap, jnp.array(GRADIENT_SIZES)[:, None]
+    sizes = jnp.array(GRADIENT_SIZES)[:, None]
     return Maps(
         own=_square(own),
         other=_square(other),
         body=_square(body),
         keep=_square(jnp.eye(6) + step * jnp.eye(6, k=3)),
         gain=_square(jnp.concatenate([step * rate, rate])),
-        **dict(zip(("east", "north", "gap", "sizes"), map(_repeated, sides))),
+        east=_repeated(added[:, 0:1]),
+        north=_repeated(added[:, 1:2]),
+        gap=_repeated(gap),
+        sizes=_repeated(sizes),
     )
 
 
@@ -154,9 +161,9 @@ def _repeated(column: Float[Array, "row 1"]) -> Float[Array, "16 16"]:
     return _square(jnp.broadcast_to(column, (column.shape[0], COLUMNS)))
 
 
-def _given(
+def _problem(
     network: InteractionNetwork, initial: Array, still: Still, drive: Drive
-) -> Given:
+) -> Problem:
     extra = -initial.shape[0] % PUSHES
 
     def filled(x: Array) -> Array:
@@ -164,29 +171,24 @@ def _given(
 
     initial, still, drive = jax.tree.map(filled, (initial, still, drive))
     start, fixed = in_columns((initial, still))
-    times = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
-    pusher = times.pusher
-    if pusher is None:
-        pusher = jnp.zeros((times.action.shape[0], initial.shape[0], 2))
-
-    def place(now: Float[Array, "push 2"]) -> Array:
-        each = jnp.broadcast_to(now.T[:, None], (2, *fixed.radius.shape))
-        return _to_blocks(each, rows=2)
-
-    pair_rest, body_rest = jax.vmap(
-        lambda now: _rests(
-            network, Moment(jnp.zeros_like(start), fixed, in_columns(now))
-        )
-    )(times)
     reach = fixed.radius + fixed.pusher_radius[None]
-    return Given(
+    given = Given(
         first=_to_blocks(start),
-        pair_rest=pair_rest,
-        body_rest=body_rest,
-        pusher=jax.vmap(place)(pusher),
         pushed=_to_blocks(fixed.pushed[None], rows=1)[:, 0],
         reach=_to_blocks(reach[None], rows=1)[:, 0],
     )
+    by_time = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
+    still_start = jnp.zeros_like(start)
+
+    def at(now: Drive) -> Times:
+        moment = Moment(still_start, fixed, in_columns(now))
+        pusher = (
+            jnp.zeros((2, initial.shape[0])) if now.pusher is None else now.pusher.T
+        )
+        each = jnp.broadcast_to(pusher[:, None], (2, *fixed.radius.shape))
+        return Times(*_rests(network, moment), _to_blocks(each, rows=2))
+
+    return Problem(_maps(network), given, jax.vmap(at)(by_time))
 
 
 def _rests(network: InteractionNetwork, still: Moment) -> tuple[Array, Array]:
