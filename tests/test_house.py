@@ -296,6 +296,8 @@ ENGINEER = (
 SCREENING = ("planning/screening", "bench/screening")
 ON_GPU = (
     "models/correctors/fused",
+    # With lines that stood in learning/fit.py and learning/step.py before.
+    "learning/job",
     "learning/sources",
     "learning/together",
     "studies/on_gpu",
@@ -351,7 +353,7 @@ COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
         lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
-        15_440,
+        15_325,
         11_000,
     ),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),
@@ -432,8 +434,8 @@ COUNTS = {
     ),
     "code lines of training on a GPU": (
         lambda: sum(map(code_lines, modules_of(ON_GPU))),
-        540,
-        540,
+        825,
+        825,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
     "isinstance on controls": (

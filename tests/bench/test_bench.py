@@ -31,7 +31,7 @@ from sainet.bench.training import (
 )
 from sainet.cli.bench import Bench, bench_commands
 from sainet.cli.output import Output
-from sainet.learning.state import trained_layers, with_layers
+from sainet.learning.step import trained_layers, with_layers
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.features import feature_set
 from sainet.models.inputs import Drive, Still, in_columns

@@ -7,9 +7,9 @@ import pytest
 from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
 from sainet.datasets.batch import to_batch, to_initial
-from sainet.learning import fit as fit_module
 from sainet.learning.batches import predict_batch
 from sainet.learning.fit import fit
+from sainet.learning.job import Best
 from sainet.learning.loss import loss_weights, path_to_frame
 from sainet.learning.mixture import Mixture
 from sainet.learning.recipes import (
@@ -19,7 +19,7 @@ from sainet.learning.recipes import (
     FromModel,
     FromSimulator,
 )
-from sainet.learning.state import Best, trained_layers
+from sainet.learning.step import trained_layers
 from sainet.learning.task import Existing, Task
 from sainet.models.card import read_card
 from sainet.models.checkpoint import load_network
@@ -164,7 +164,7 @@ def test_the_best_network_on_the_validation_pushes_is_kept(
 
         return validate
 
-    monkeypatch.setattr(fit_module.Mixture, "validate", validation)
+    monkeypatch.setattr(Mixture, "validate", validation)
     patient = TUNING.changed(patience=4)
     result = fit(
         "in",

@@ -18,13 +18,16 @@ from sainet.learning.loss import (
     to_target,
 )
 from sainet.learning.recipes import PAPER, Objective, Optimiser
-from sainet.learning.state import (
+from sainet.learning.step import (
+    data_loss,
+    even_batch,
     first_state,
+    make_gradient,
     make_optimizer,
+    make_step,
     trained_layers,
     with_layers,
 )
-from sainet.learning.step import data_loss, even_batch, make_gradient, make_step
 
 PUSHES = 6
 WEIGHTS = LossWeights(*map(jnp.float32, (1e4, 1e2, 1e2, 1.0)))

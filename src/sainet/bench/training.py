@@ -29,8 +29,7 @@ from sainet.learning.loss import (
     to_target,
 )
 from sainet.learning.recipes import PAPER, Recipe
-from sainet.learning.state import FitState, first_state
-from sainet.learning.step import even_batch, make_step
+from sainet.learning.step import FitState, even_batch, first_state, make_step
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.correctors.network import FEATURE_BOUND, AbstractNetwork
 from sainet.models.features import feature_set

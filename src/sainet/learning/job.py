@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import msgspec
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float, Int
 
 from sainet.datasets.groups import groups_of
 from sainet.datasets.store import Store
@@ -17,7 +19,7 @@ from sainet.learning.log import LogLine, append_log, rewind_log
 from sainet.learning.loss import LossWeights
 from sainet.learning.mixture import Mixture, Validate
 from sainet.learning.recipes import FROM_ENGINE, FromModel, Recipe, Start
-from sainet.learning.state import Best, FitState, Trained, trained_layers
+from sainet.learning.step import FitState, Trained, trained_layers, with_layers
 from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
@@ -33,6 +35,35 @@ from sainet.runs.manifest import MANIFEST, Manifest, manifest
 from sainet.scenes.recording import AGREES
 
 STATE = "state.safetensors"
+
+
+class Best(eqx.Module):
+    """Its layers, and when and how good it was; part of a checkpoint."""
+
+    layers: Trained
+    loss: Float[Array, ""]  # on the validation pushes
+    iteration: Int[Array, ""]
+
+    @staticmethod
+    def first(network: AbstractNetwork, loss: float) -> "Best":
+        """Return the network that training begins with: it may remain the best."""
+        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(0))
+
+    def or_better(
+        self, network: AbstractNetwork, loss: float, iteration: int
+    ) -> "Best":
+        """Return the better one of this and another network."""
+        if not loss < float(self.loss):
+            return self
+        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(iteration))
+
+    def is_stale(self, iteration: int, patience: int) -> bool:
+        """Return whether nothing has become better for so many iterations."""
+        return 0 < patience <= iteration - int(self.iteration)
+
+    def put_into(self, network: AbstractNetwork) -> AbstractNetwork:
+        """Return the network with the best layers."""
+        return with_layers(network, self.layers)
 
 
 @dataclass

@@ -17,8 +17,7 @@ from sainet.datasets.store import Store
 from sainet.learning.checks import check_task
 from sainet.learning.loss import LossWeights
 from sainet.learning.sources import source_of
-from sainet.learning.state import FitState, first_state
-from sainet.learning.step import data_loss, even_batch
+from sainet.learning.step import FitState, data_loss, even_batch, first_state
 from sainet.learning.task import Task, first_network, settings, statistics
 from sainet.models.correctors.network import AbstractNetwork, Scales
 from sainet.runs.documents import content_hash

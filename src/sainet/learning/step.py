@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import optax
 from jax import lax
 from jax.flatten_util import ravel_pytree
 from jax.sharding import NamedSharding, PartitionSpec
@@ -16,16 +18,97 @@ from sainet.engines.devices import BATCH, batch_mesh, is_one_gpu
 from sainet.learning.batches import predict_batch
 from sainet.learning.loss import LossWeights, push_losses, to_target
 from sainet.learning.recipes import Optimiser, Recipe
-from sainet.learning.state import (
-    FitState,
-    Trained,
-    trained_layers,
-    update,
-    with_layers,
-)
 from sainet.models.correctors.network import AbstractNetwork
 
+_MOST_BAD_STEPS = 100  # in a row, before non-finite updates are let through
 _MICROBATCH = 500  # pushes at a time: 20,000 single steps would leave the cache
+
+Trained = Any  # tuple[Layers, Layers]: a tree, which Optax's types do not know
+
+
+class FitState(eqx.Module):
+    """Everything that changes while training: enough to resume, bit for bit."""
+
+    network: AbstractNetwork
+    optimizer: Any
+    iteration: Array
+    average: Trained | None = None  # of the layers, if the recipe averages
+
+    @property
+    def result(self) -> AbstractNetwork:
+        """The network with which training would end now."""
+        if self.average is None:
+            return self.network
+        return with_layers(self.network, self.average)
+
+
+def make_optimizer(optimiser: Optimiser) -> optax.GradientTransformation:
+    """Return Adam with a falling learning rate, guarded against exploding steps."""
+    schedule = _schedule(optimiser)
+    chain = optax.chain(
+        optax.clip_by_global_norm(optimiser.clip_norm), optax.adam(schedule)
+    )
+    return optax.apply_if_finite(chain, _MOST_BAD_STEPS)
+
+
+def _schedule(optimiser: Optimiser) -> optax.Schedule:
+    """Return the learning rate by the number of iterations so far."""
+    first = optimiser.learning_rate
+    if optimiser.decay == "cosine":
+        return optax.cosine_decay_schedule(first, optimiser.iterations)
+    return optax.exponential_decay(first, optimiser.halve_every, 0.5, staircase=True)
+
+
+def trained_layers(network: AbstractNetwork) -> Trained:
+    """Return the part of a network that is trained: all except its scales."""
+    return network.trained
+
+
+def with_layers(network: AbstractNetwork, layers: Trained) -> AbstractNetwork:
+    """Return the network with other weights."""
+    return eqx.tree_at(trained_layers, network, layers)
+
+
+def first_state(network: AbstractNetwork, optimiser: Optimiser) -> FitState:
+    """Return the state before the first iteration."""
+    layers = trained_layers(network)
+    moments = make_optimizer(optimiser).init(layers)
+    average = layers if optimiser.average else None
+    return FitState(network, moments, jnp.zeros((), jnp.int32), average)
+
+
+def _averaged(average: Trained, layers: Trained, span: int, done: Array) -> Trained:
+    """Return the exponential mean, over a shorter span in the first iterations.
+
+    The first weights must not stay in it for long: the share of the new weights is that
+    of TensorFlow's `ExponentialMovingAverage` with `num_updates`.
+    """
+    share = jnp.maximum(1 / span, 9 / (10 + done))
+    return optax.incremental_update(layers, average, share)
+
+
+# Compiled once for each optimiser, for any number of networks.
+@partial(jax.jit, static_argnames=("optimiser",))
+def _update(
+    state: FitState,
+    start: Trained | None,
+    summed: Trained,
+    pushes: Array,
+    *,
+    optimiser: Optimiser,
+    l2: float | Array,
+) -> FitState:
+    """Take Adam's step along the mean gradient of so many pushes, l2 added."""
+    layers = trained_layers(state.network)
+    change = layers if start is None else jax.tree.map(jnp.subtract, layers, start)
+    mean = jax.tree.map(lambda g, w: g / pushes + 2 * l2 * w, summed, change)
+    updates, moments = make_optimizer(optimiser).update(mean, state.optimizer, layers)
+    layers = optax.apply_updates(layers, updates)
+    average = state.average
+    if average is not None:
+        average = _averaged(average, layers, optimiser.average, state.iteration)
+    network = with_layers(state.network, layers)
+    return FitState(network, moments, state.iteration + 1, average)
 
 
 def data_loss(
@@ -147,7 +230,7 @@ def make_step(
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
         pushes = jnp.sum(batch.is_observed)
-        after = update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
+        after = _update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
         return after, total / pushes
 
     return step
@@ -177,7 +260,7 @@ def step_in_one(optimiser: Optimiser, hold: int, side: Side) -> tuple[FitState, 
 
     total, summed = jax.value_and_grad(loss)(trained_layers(network))
     pushes = jnp.sum(batch.is_observed)
-    after = update(
+    after = _update(
         side.state, side.start, summed, pushes, optimiser=optimiser, l2=side.l2
     )
     return after, total / pushes

@@ -10,8 +10,7 @@ from jaxtyping import Array
 
 from sainet.learning.job import Job, finish
 from sainet.learning.mixture import Batches
-from sainet.learning.state import FitState
-from sainet.learning.step import Side, step_together
+from sainet.learning.step import FitState, Side, step_together
 from sainet.runs.errors import Diverged
 from sainet.runs.interrupts import raise_if_interrupted
 
