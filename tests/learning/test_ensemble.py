@@ -16,8 +16,10 @@ from sainet.datasets.batch import to_batch
 from sainet.datasets.splits import split_rows
 from sainet.evaluation.coverage import coverage_of
 from sainet.evaluation.evaluate import evaluate
+from sainet.learning import ensemble as ensemble_module
 from sainet.learning.ensemble import CALIBRATION, fit_ensemble
 from sainet.learning.fit import fit
+from sainet.learning.log import read_log
 from sainet.learning.recipes import PAPER, SingleSteps
 from sainet.models.dynamics import predict
 from sainet.models.ensemble_card import ENSEMBLE, member
@@ -130,6 +132,25 @@ def test_members_are_networks_of_consecutive_seeds(folder, store, tmp_path):
     fit(folder.name, store.take(np.sort(rest)), alone, tmp_path / "alone")
     wanted = load_model(str(tmp_path / "alone")).card.weights
     assert load_model(str(member(folder, 1))).card.weights == wanted
+
+
+def test_members_train_at_once_on_a_gpu(store, folder, tmp_path, monkeypatch):
+    # Everything but the kernels, which need the GPU itself.
+    monkeypatch.setattr(ensemble_module, "is_one_gpu", lambda: True)
+    steps = []
+    name = folder.name
+    fit_ensemble(
+        name,
+        store,
+        RECIPE,
+        tmp_path / "out",
+        members=MEMBERS,
+        on_step=lambda done, loss: steps.append(done),
+    )
+    assert steps == [3, 6, 9]  # of all members together
+    found, wanted = (read_log(member(p, 2)) for p in (tmp_path / "out", folder))
+    for one, two in zip(found, wanted, strict=True):
+        assert one.loss == pytest.approx(two.loss, rel=1e-3)
 
 
 def test_an_identical_call_changes_nothing(folder, store):

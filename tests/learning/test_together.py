@@ -108,6 +108,23 @@ def test_a_network_that_diverges_leaves_the_others_alone(store, alone, tmp_path)
         jobs[1].note(RECIPE.log_every, jnp.array(jnp.nan))
 
 
+def test_a_network_that_stops_early_is_finished_then(store, tmp_path):
+    recipe = RECIPE.changed(validation_share=1 / 6, patience=3, learning_rate=1e-9)
+    patient = RECIPE.changed(validation_share=1 / 6, learning_rate=1e-9, patience=99)
+    fit("sain", store, recipe, tmp_path / "alone")
+    jobs = [
+        begin("sain", store, recipe, tmp_path / "early"),
+        begin("sain", store, patient, tmp_path / "late"),
+    ]
+    fit_together(jobs)
+    early, late, alone = (
+        [line.iteration for line in read_log(tmp_path / name)]
+        for name in ("early", "late", "alone")
+    )
+    assert early == alone
+    assert late == [3, 6, 9, 12]
+
+
 def test_a_dataset_on_the_device_gives_the_batches_that_are_read(store, monkeypatch):
     job_of = lambda: Batches(begun_mixture(store))  # noqa: E731
     read = job_of()

@@ -13,10 +13,13 @@ from jaxtyping import Array, Float
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.splits import last_known, split_rows
 from sainet.datasets.store import Store
-from sainet.learning.fit import fit
+from sainet.engines.devices import is_one_gpu
+from sainet.learning.fit import complete
+from sainet.learning.job import Job, begin
 from sainet.learning.log import read_log
 from sainet.learning.process import quantile
 from sainet.learning.recipes import Recipe, SingleSteps
+from sainet.learning.together import fit_together
 from sainet.models.ensemble import Ensemble
 from sainet.models.ensemble_card import ENSEMBLE, MEMBERS, EnsembleCard, Pair, member
 from sainet.models.identity import ModelKind
@@ -83,16 +86,13 @@ def fit_ensemble(
     config = {"command": "train", "model": model, "members": members}
     config |= {"data": store.content, "engine": str(assumed_engine), **settings}
     folder = open_run(out, config, finished_by=ENSEMBLE)
-    training, total = store.take(np.sort(rest)), recipe.optimiser.iterations
-    for number in range(members):
-        fit(
-            model,
-            training,
-            recipe.changed(seed=recipe.seed + number),
-            member(out, number),
-            assumed_engine=assumed_engine,
-            on_step=lambda n, loss, number=number: on_step(number * total + n, loss),
-        )
+    training = store.take(np.sort(rest))
+
+    def job(number: int) -> Job | None:
+        own, place = recipe.changed(seed=recipe.seed + number), member(out, number)
+        return begin(model, training, own, place, assumed_engine=assumed_engine)
+
+    _train(job, members, on_step)
     logs = [read_log(member(out, number)) for number in range(members)]
     losses = [log[-1].loss for log in logs if log]
     loss = float(np.mean(losses)) if losses else None
@@ -107,6 +107,21 @@ def fit_ensemble(
         )
         write_document(out / ENSEMBLE, card)
     return loss
+
+
+def _train(
+    job: Callable[[int], Job | None],
+    members: int,
+    on_step: Callable[[int, float | None], None],
+) -> None:
+    """Train all members that are not finished: on a GPU at once."""
+    if is_one_gpu():
+        jobs = [each for each in map(job, range(members)) if each is not None]
+        fit_together(jobs, lambda done, loss: on_step(members * done, loss))
+    for number in range(members):
+        if (one := job(number)) is not None:
+            before = number * one.recipe.optimiser.iterations
+            complete(one, lambda done, loss, n=before: on_step(n + done, loss))
 
 
 class _Calibrated(NamedTuple):

@@ -90,12 +90,16 @@ def _iterate(
 def _noted(
     members: Sequence[_Member], iteration: int, found: Sequence[tuple[FitState, Array]]
 ) -> Iterator[_Member]:
-    """Yield the members that go on."""
+    """Yield the members that go on; finish those that end early."""
     for member, (state, loss) in zip(members, found, strict=True):
         member.job.progress.state = state
         try:
-            member.job.note(iteration, loss)
+            is_over = member.job.note(iteration, loss)
         except Diverged:
             member.close()
             continue
-        yield member
+        if is_over:
+            member.close()
+            finish(member.job)
+        else:
+            yield member

@@ -3,6 +3,7 @@
 import os
 import platform
 import subprocess
+import sys
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
@@ -29,6 +30,7 @@ class Manifest(msgspec.Struct, frozen=True, kw_only=True):
     processor: str
     cores: int | None
     devices: int
+    gpu: str | msgspec.UnsetType = msgspec.UNSET  # its name, if JAX computed on one
     format_version: int = 2
 
 
@@ -46,7 +48,16 @@ def manifest(devices: int = 0) -> Manifest:
         processor=processor(),
         cores=os.cpu_count(),
         devices=devices,
+        gpu=_gpu(),
     )
+
+
+def _gpu() -> str | msgspec.UnsetType:
+    """Return the name of the GPU of this process; asks only JAX that is imported."""
+    jax = sys.modules.get("jax")
+    if jax is None or jax.default_backend() != "gpu":
+        return msgspec.UNSET
+    return str(jax.devices()[0].device_kind)
 
 
 def code_versions() -> dict[str, str | None]:

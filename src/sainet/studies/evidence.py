@@ -97,7 +97,8 @@ class Evidence:
 def described(machine: Manifest) -> str:
     """Return processor, cores and versions in words."""
     known = ", ".join(f"{k} {v}" for k, v in machine.versions.items() if v)
-    return f"{machine.processor}, {machine.cores} cores; {known}"
+    gpu = f", {machine.gpu}" if machine.gpu else ""
+    return f"{machine.processor}, {machine.cores} cores{gpu}; {known}"
 
 
 def keep(path: Path, root: Path) -> None:
