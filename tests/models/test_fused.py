@@ -24,6 +24,7 @@ from sainet.models.integrators import GRADIENT_SIZES, RelaxingResidual
 from sainet.models.integrators import bound_gradient as bound_of_scan
 
 STEPS, PUSHES = 6, 11  # a block and a part of one
+STEP = 0.2  # s, so long that motion feeds back
 FORMS = (
     ("robot", True, "paper"),
     ("robot", False, "paper"),
@@ -48,7 +49,7 @@ def network_of(kind, simulator, name, **settings):
     )
     key = jax.random.key(1)
     return InteractionNetwork(
-        features, time_step=1 / 240, key=key, scales=scales, **settings
+        features, time_step=STEP, key=key, scales=scales, **settings
     )
 
 
