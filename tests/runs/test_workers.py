@@ -130,6 +130,19 @@ def test_workers_with_a_core_each_share_the_cores_evenly():
         assert pool.submit(affinity, 0).result()[0] == cores
 
 
+def platform() -> str | None:
+    import jax
+
+    assert jax.default_backend() == "cpu"
+    return os.environ.get("JAX_PLATFORMS")
+
+
+def test_workers_leave_a_gpu_to_the_process_that_started_them(monkeypatch):
+    monkeypatch.delenv("JAX_PLATFORMS", raising=False)
+    with worker_pool(1) as pool:
+        assert pool.submit(platform).result() == "cpu"
+
+
 def test_cores_are_counted_where_affinity_is_unknown(monkeypatch):
     assert 1 <= core_count() <= (os.cpu_count() or 1)
     monkeypatch.delattr(os, "sched_getaffinity")
