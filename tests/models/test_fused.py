@@ -12,6 +12,7 @@ import pytest
 from sainet.datasets.batch import to_batch
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import simulate_chunk, store_info
+from sainet.learning import batches
 from sainet.learning.step import trained_layers, with_layers
 from sainet.models.correctors import Start
 from sainet.models.correctors.fused.arithmetic import bound_gradient
@@ -143,3 +144,17 @@ def test_a_push_that_overflows_does_not_reach_the_others(batch_of):
     found = path(layers, network, broken, interpreted)
     others = np.delete(np.arange(PUSHES), 3)
     np.testing.assert_array_equal(found[:, others], wanted[:, others])
+
+
+def test_training_uses_the_kernels_on_a_gpu_if_jax_has_what_they_need(monkeypatch):
+    network = network_of("robot", True, "paper")
+    assert batches._unroll(network, 2, 1) is None  # on a CPU
+    monkeypatch.setattr(batches, "is_one_gpu", lambda: True)
+    assert batches._unroll(network, 2, 1) is unroll_fused
+    assert batches._unroll(network, 3, 1) is None
+
+    def missing(name):
+        raise ImportError(name)
+
+    monkeypatch.setattr(batches, "import_module", missing)
+    assert batches._unroll(network, 2, 1) is None

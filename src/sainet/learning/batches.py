@@ -136,7 +136,10 @@ def _unroll(
     """Return how training applies a network; None is as prediction does."""
     if isinstance(network.integrator, RelaxingResidual) and hold > 1:
         return partial(unroll_held, hold=hold)
-    if is_one_gpu():
-        fused = import_module("sainet.models.correctors.fused.unroll")  # imports Pallas
-        return fused.unroll_fused if fused.fits(network, disks) else None
-    return None
+    if not is_one_gpu():
+        return None
+    try:
+        fused = import_module("sainet.models.correctors.fused.unroll")
+    except ImportError:  # JAX announces the end of Triton in Pallas
+        return None
+    return fused.unroll_fused if fused.fits(network, disks) else None
