@@ -93,6 +93,21 @@ def test_an_interrupted_run_goes_on_together_or_alone(
     assert_alike(tmp_path, alone)
 
 
+def test_a_run_that_was_killed_before_its_card_is_finished(
+    store, alone, tmp_path, monkeypatch
+):
+    def killed(job):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(together_module, "finish", killed)
+        with pytest.raises(KeyboardInterrupt):
+            fit_together(begun(store, tmp_path)[:1])
+    assert (tmp_path / "0" / STATE).is_file()
+    fit_together(begun(store, tmp_path))  # one has no iteration left
+    assert_alike(tmp_path, alone)
+
+
 def test_a_network_that_diverges_leaves_the_others_alone(store, alone, tmp_path):
     jobs = begun(store, tmp_path)
     network = jobs[1].progress.state.network

@@ -29,14 +29,22 @@ def fit_together(
             the same form, and their optimisers are the same.
         on_step: called with the finished iterations of each, and a last logged loss.
     """
-    for alike in _alike(jobs):
-        _iterate(alike, on_step)
+    for job in jobs:
+        if not job.left:  # interrupted after its last iteration
+            finish(job)
+    members = [_Member(job) for job in jobs if job.left]
+    try:
+        for alike in _alike(members):
+            _iterate(alike, on_step)
+    finally:
+        for member in members:
+            member.close()
 
 
-def _alike(jobs: Sequence[Job]) -> Iterator[list["_Member"]]:
-    members = [(member.form, member) for member in map(_Member, jobs)]
-    members.sort(key=lambda each: hash(each[0]))
-    for _, group in groupby(members, key=itemgetter(0)):
+def _alike(members: Sequence["_Member"]) -> Iterator[list["_Member"]]:
+    formed = [(member.form, member) for member in members]
+    formed.sort(key=lambda each: hash(each[0]))
+    for _, group in groupby(formed, key=itemgetter(0)):
         yield [member for _, member in group]
 
 
@@ -70,19 +78,15 @@ class _Member:
 def _iterate(
     members: list[_Member], on_step: Callable[[int, float | None], None]
 ) -> None:
-    recipe, left = members[0].job.recipe, members[0].job.left
-    try:
-        for iteration in left:
-            raise_if_interrupted()
-            sides = tuple(member.side(iteration) for member in members)
-            found = step_together(recipe.optimiser, recipe.horizon.hold, sides)
-            members = list(_noted(members, iteration, found))
-            if not members:
-                return
-            on_step(iteration, members[0].job.progress.last_loss)
-    finally:
-        for member in members:
-            member.close()
+    recipe = members[0].job.recipe
+    for iteration in members[0].job.left:
+        raise_if_interrupted()
+        sides = tuple(member.side(iteration) for member in members)
+        found = step_together(recipe.optimiser, recipe.horizon.hold, sides)
+        members = list(_noted(members, iteration, found))
+        if not members:
+            return
+        on_step(iteration, members[0].job.progress.last_loss)
     for member in members:
         finish(member.job)
 
@@ -96,10 +100,8 @@ def _noted(
         try:
             is_over = member.job.note(iteration, loss)
         except Diverged:
-            member.close()
             continue
         if is_over:
-            member.close()
             finish(member.job)
         else:
             yield member
