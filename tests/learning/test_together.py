@@ -153,6 +153,8 @@ def test_a_dataset_on_the_device_gives_the_batches_that_are_read(store, monkeypa
             strict=True,
         ):
             np.testing.assert_array_equal(x, y)
+    again = job_of()
+    assert again._sources[0]._whole is picked._sources[0]._whole  # once on the device
     read.close()
     picked.close()
 

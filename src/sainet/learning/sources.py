@@ -1,6 +1,7 @@
 """Where the batches of a job come from: its dataset, or the memory of a GPU."""
 
 from abc import ABC, abstractmethod
+from weakref import WeakValueDictionary
 
 import jax
 import jax.numpy as jnp
@@ -62,12 +63,19 @@ class Resident(Source):
     def __init__(self, task: Task, reader: BatchReader) -> None:
         """Transfer the dataset."""
         super().__init__(task, reader)
-        self._whole = task.to_batch(reader.whole(), task.store.info.steps)
+        key = task.training.content, repr(task.inner), task.recipe.horizon.steps
+        known = _residents.get(key)
+        self._whole = known or task.to_batch(reader.whole(), task.store.info.steps)
+        _residents[key] = self._whole
 
     def take(self, place: int, iteration: int) -> PushBatch:
         """Return a batch, by its place in the order of this dataset."""
         batch = _pick(self._whole, jnp.asarray(self._reader.rows(place)))
         return self._task.augmented(batch, iteration)
+
+
+# Networks that train at once share what is equal, while one of them needs it.
+_residents = WeakValueDictionary[tuple[str, str, int], PushBatch]()
 
 
 @jax.jit

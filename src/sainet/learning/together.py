@@ -1,8 +1,6 @@
 """Several networks that train at once on a GPU, which one alone leaves mostly idle."""
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import groupby
-from operator import itemgetter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -41,11 +39,11 @@ def fit_together(
             member.close()
 
 
-def _alike(members: Sequence["_Member"]) -> Iterator[list["_Member"]]:
-    formed = [(member.form, member) for member in members]
-    formed.sort(key=lambda each: hash(each[0]))
-    for _, group in groupby(formed, key=itemgetter(0)):
-        yield [member for _, member in group]
+def _alike(members: Sequence["_Member"]) -> Iterable[list["_Member"]]:
+    groups: dict[object, list[_Member]] = {}
+    for member in members:
+        groups.setdefault(member.form, []).append(member)
+    return groups.values()
 
 
 class _Member:
@@ -65,10 +63,9 @@ class _Member:
 
     def side(self, iteration: int) -> Side:
         """Return the state, and the inputs of an iteration."""
-        job = self.job
-        _, batch = self._batches.take(iteration)
-        weights = job.weights[0]
-        return Side(job.progress.state, batch, weights, job.drawn_to, self._l2)
+        job, (_, batch) = self.job, self._batches.take(iteration)
+        state, (weights,) = job.progress.state, job.weights
+        return Side(state, batch, weights, job.drawn_to, self._l2)
 
     def close(self) -> None:
         """Stop reading."""

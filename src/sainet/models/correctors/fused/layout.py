@@ -78,10 +78,7 @@ class Inputs(NamedTuple):
     @staticmethod
     def recorded(weights: Weights, steps: int, blocks: int) -> "Inputs":
         """Return the shapes of the inputs at all steps."""
-        rel, dyn = (
-            tuple(_recorded(weight.shape[1], steps, blocks) for weight in part)
-            for part in (weights.rel, weights.dyn)
-        )
+        rel, dyn = _recorded_of(weights, 1, steps, blocks)
         return Inputs(rel, dyn, _recorded(weights.effect.shape[1], steps, blocks))
 
 
@@ -94,12 +91,15 @@ class Slopes(NamedTuple):
     @staticmethod
     def recorded(weights: Weights, steps: int, blocks: int) -> "Slopes":
         """Return the shapes of the slopes at all steps."""
-        return Slopes(
-            *(
-                tuple(_recorded(weight.shape[0], steps, blocks) for weight in part)
-                for part in (weights.rel, weights.dyn)
-            )
-        )
+        return Slopes(*_recorded_of(weights, 0, steps, blocks))
+
+
+def _recorded_of(weights: Weights, axis: int, steps: int, blocks: int) -> Any:  # noqa: ANN401
+    """Return shapes for f_rel and f_dyn, by an axis of the weights."""
+    return (
+        tuple(_recorded(weight.shape[axis], steps, blocks) for weight in part)
+        for part in (weights.rel, weights.dyn)
+    )
 
 
 def _recorded(rows: int, steps: int, blocks: int) -> jax.ShapeDtypeStruct:

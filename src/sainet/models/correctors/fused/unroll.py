@@ -97,16 +97,16 @@ def _gap_row(features: FeatureSet) -> int | None:
 
 
 @lru_cache
-def _jacobians(features: FeatureSet) -> tuple[np.ndarray, ...]:
+def _jacobians(features: FeatureSet, actions: int) -> tuple[np.ndarray, ...]:
     """Return the derivatives ``[input motion]`` of all inputs but the gap.
 
     Of pairs by the own and the other motion; of bodies that are not pushed, and what
-    pushing adds.
+    pushing adds. An action has so many numbers.
     """
     with jax.ensure_compile_time_eval():
-        pair = _jacobian(features, features.of_pairs, 0.0)[:, 0, 0, 0]
+        pair = _jacobian(features.of_pairs, actions, 0.0)[:, 0, 0, 0]
         body, pushed = (
-            _jacobian(features, features.of_bodies, share)[:, 0, 0, :, 0, 0]
+            _jacobian(features.of_bodies, actions, share)[:, 0, 0, :, 0, 0]
             for share in (0.0, 1.0)
         )
     added = pushed - body
@@ -116,20 +116,20 @@ def _jacobians(features: FeatureSet) -> tuple[np.ndarray, ...]:
 
 
 def _jacobian(
-    features: FeatureSet, function: Callable[[Moment], Array], pushed: float
+    function: Callable[[Moment], Array], actions: int, pushed: float
 ) -> np.ndarray:
     """Return the derivative by the motion of two disks at rest, all other inputs 0."""
     one, two = jnp.ones((1,)), jnp.ones((DISKS, 1))
-    none, numbers = jnp.zeros((3, DISKS, 1)), 2 if features.kind == "robot" else 4
-    drive = Drive(jnp.zeros((numbers, 1)), jnp.zeros((2, 1)), none, none)
+    none = jnp.zeros((3, DISKS, 1))
+    drive = Drive(jnp.zeros((actions, 1)), jnp.zeros((2, 1)), none, none)
     still = Still(two, two, pushed * two, one, jnp.zeros((2, 1)), jnp.ones((2, 1)))
     at = lambda motion: function(Moment(motion, still, drive))  # noqa: E731
     return np.array(jax.jacfwd(at)(jnp.zeros((6, DISKS, 1))))
 
 
-def _maps(network: InteractionNetwork) -> Maps:
+def _maps(network: InteractionNetwork, actions: int) -> Maps:
     features, scales, step = network.features, network.scales, network.time_step
-    own, other, body, added = map(jnp.asarray, _jacobians(features))
+    own, other, body, added = map(jnp.asarray, _jacobians(features, actions))
     gap = jnp.zeros((features.body_size, 1))
     if (row := _gap_row(features)) is not None:
         gap = gap.at[row].set(1.0)
@@ -138,7 +138,6 @@ def _maps(network: InteractionNetwork) -> Maps:
         own, other = own / pair, other / pair
         body, added, gap = body / each, added / each, gap / each
     rate = step * jnp.diag(scales.acceleration)
-    sizes = jnp.array(GRADIENT_SIZES)[:, None]
     return Maps(
         own=_square(own),
         other=_square(other),
@@ -148,7 +147,7 @@ def _maps(network: InteractionNetwork) -> Maps:
         east=_repeated(added[:, 0:1]),
         north=_repeated(added[:, 1:2]),
         gap=_repeated(gap),
-        sizes=_repeated(sizes),
+        sizes=_repeated(jnp.array(GRADIENT_SIZES)[:, None]),
     )
 
 
@@ -188,7 +187,8 @@ def _problem(
         each = jnp.broadcast_to(pusher[:, None], (2, *fixed.radius.shape))
         return Times(*_rests(network, moment), _to_blocks(each, rows=2))
 
-    return Problem(_maps(network), given, jax.vmap(at)(by_time))
+    maps = _maps(network, drive.action.shape[-1])
+    return Problem(maps, given, jax.vmap(at)(by_time))
 
 
 def _rests(network: InteractionNetwork, still: Moment) -> tuple[Array, Array]:
