@@ -12,6 +12,7 @@ __all__ = ["compile_fast_elsewhere", "use_cache", "use_devices"]
 _FAST: dict[str, str | bool] = {
     "xla_backend_optimization_level": "0",
     "xla_cpu_use_fusion_emitters": False,
+    "xla_cpu_parallel_codegen_split_count": "1",
 }
 
 
