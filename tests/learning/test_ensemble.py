@@ -161,15 +161,21 @@ def test_an_identical_call_changes_nothing(folder, store):
 
 def test_edited_ensembles_are_refused(folder, tmp_path):
     for name, value, message in (
-        ("members", ["0" * 64] * MEMBERS, "members.0. is not the hash"),
+        ("members", ["0" * 64] * MEMBERS, "seal: the file was edited"),
+        ("reach", [[0.1, 0.1]] * 2, "seal: the file was edited"),
         ("reach", [[1.0, 1.0]], "differ in their numbers"),
         ("floor", [[0.0, 1.0]] * 2, "floor"),
     ):
-        other = shutil.copytree(folder, tmp_path / name)
+        other = shutil.copytree(folder, tmp_path / name, dirs_exist_ok=True)
         card = json.loads((other / ENSEMBLE).read_text())
         (other / ENSEMBLE).write_text(json.dumps(card | {name: value}))
         with pytest.raises(BadCheckpoint, match=message):
             load_model(str(other))
+    other = shutil.copytree(folder, tmp_path / "other-member")
+    shutil.rmtree(member(other, 0))
+    shutil.copytree(member(other, 1), member(other, 0))
+    with pytest.raises(BadCheckpoint, match="members.0. is not the hash"):
+        load_model(str(other))
     other = shutil.copytree(folder, tmp_path / "missing")
     shutil.rmtree(member(other, 2))
     with pytest.raises(BadCheckpoint, match="member-2"):

@@ -303,12 +303,14 @@ def edited(folder, tmp_path, **changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"weights": "0" * 64}, "weights is another hash"),
-        ({"trained_pushes": 7}, "inputs is float64"),
+        ({"weights": "0" * 64}, "seal: the file was edited. Fit it again"),
+        ({"trained_pushes": 7}, "seal"),
+        ({"pushes": ""}, "seal"),
+        ({"camera": {"shift_mm": [30.0, 0.0]}}, "process.json"),
         ({"disks": 3}, "disks"),
-        ({"inputs": ["contact_angle"]}, "inputs is float64"),
+        ({"inputs": ["contact_angle"]}, "seal"),
         ({"inputs": ["../x"]}, "inputs"),
-        ({"inputs": ["mass_3"]}, "inputs has 'mass_3', no input"),
+        ({"seal": ""}, "seal"),
         ({"kind": "direct-force"}, "kind"),
         ({"format_version": 2}, "format_version"),
     ],
@@ -317,6 +319,13 @@ def test_an_edited_card_is_refused(folder, tmp_path, changes, message):
     with pytest.raises(BadCheckpoint, match=message) as refused:
         load_model(edited(folder, tmp_path, **changes))
     assert "\n" not in str(refused.value)
+
+
+def test_an_edited_property_of_the_engine_is_refused(folder, tmp_path):
+    identity = json.loads((folder / PROCESS).read_text())["identity"]
+    identity["simulator"]["assumptions"]["table_friction"] = 0.6
+    with pytest.raises(BadCheckpoint, match="seal: the file was edited"):
+        load_model(edited(folder, tmp_path, identity=identity))
 
 
 def test_edited_arrays_are_refused(folder, tmp_path):

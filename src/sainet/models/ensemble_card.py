@@ -35,6 +35,7 @@ class EnsembleCard(msgspec.Struct, frozen=True, kw_only=True):
     calibrated_on: Annotated[int, msgspec.Meta(ge=1)]  # pushes that no member saw
     pushes: str  # all, by `runs.digests`: of members and of the calibration
     final_loss: Finite | None = None
+    seal: str = ""  # hash of all other fields
     format_version: Literal[1] = 1
 
     def __post_init__(self) -> None:

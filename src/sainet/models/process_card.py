@@ -19,7 +19,6 @@ from sainet.models.correctors.process import (
     Inputs,
     Process,
     ResidualProcess,
-    input_names,
 )
 from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.runs.documents import content_hash, read_document, read_file
@@ -67,6 +66,7 @@ class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
     recipe: ProcessSettings
     manifest: Manifest
     final_loss: float  # negative log likelihood for each push and output
+    seal: str = ""  # hash of all other fields
     format_version: Literal[1] = 1
 
     def __post_init__(self) -> None:
@@ -190,11 +190,7 @@ def read_process_card(folder: Path) -> ProcessCard:
         BadCheckpoint: damaged, out of bounds or of another format.
     """
     path = folder / PROCESS
-    card = read_document(path, ProcessCard, error=BadCheckpoint, remedy=_REMEDY)
-    for name in card.inputs:
-        if name not in input_names(card.disks):
-            raise BadCheckpoint(f"{path}: inputs has {name!r}, no input; {_REMEDY}.")
-    return card
+    return read_document(path, ProcessCard, error=BadCheckpoint, remedy=_REMEDY)
 
 
 def load_process(folder: Path) -> tuple[ResidualProcess, ProcessCard]:
@@ -233,18 +229,9 @@ def read_process(folder: Path) -> tuple[Fitted, ProcessCard]:
         arrays = load_arrays(folder / ARRAYS, like)
     fitted = Fitted(*map(np.asarray, arrays))
     found = content_hash(read_file(folder / ARRAYS, error=BadCheckpoint))
-    if found != card.weights or not _is_possible(fitted):
+    if found != card.weights:
         raise BadCheckpoint(
             f"{folder / PROCESS}: weights is another hash than that of {ARRAYS}; the "
             "two do not belong together, fit the process again."
         )
     return fitted, card
-
-
-def _is_possible(fitted: Fitted) -> bool:
-    """Return whether everything that must be positive is."""
-    positive = (fitted.amplitude, fitted.length, fitted.noise, fitted.scale)
-    return all(
-        (each > 0).all()
-        for each in (*positive, fitted.width, fitted.reach, fitted.plain)
-    )

@@ -6,7 +6,7 @@ import json
 import os
 import stat
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar
@@ -163,7 +163,8 @@ def read_document(
     Args:
         path: of the file.
         kind: the struct. Where it has a field `format_version`, the default of that
-            field is the only version that is read (JSON).
+            field is the only version that is read (JSON). A field `seal` must be the
+            hash of all others.
         decode: for another format than JSON, for example `msgspec.toml.decode`.
         error: to raise.
         remedy: what the user can do, without a full stop: "train it again".
@@ -175,15 +176,36 @@ def read_document(
     advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
     try:
         _check_version(path, data, kind, error)
-        return decode(data, type=kind)
+        found = decode(data, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
         raise error(f"{path}: {_reason(cause)}.{advice}") from None
+    if _has_seal(kind):
+        fields = msgspec.json.decode(data)
+        if fields.get("seal") != _seal_of(fields):
+            raise error(f"{path}: seal: the file was edited.{advice}")
+    return found
 
 
 def write_document(path: Path, document: msgspec.Struct) -> None:
-    """Write a struct as JSON with sorted keys: equal documents are equal bytes."""
+    """Write a struct as JSON with sorted keys: equal documents are equal bytes.
+
+    A field `seal` becomes the hash of all others, which `read_document` checks.
+    """
     # By way of builtins: msgspec would write NaN as null.
-    write_json(path, msgspec.to_builtins(document, order="sorted"))
+    fields = msgspec.to_builtins(document, order="sorted")
+    if _has_seal(type(document)):
+        fields["seal"] = _seal_of(fields)
+    write_json(path, fields)
+
+
+def _has_seal(kind: type) -> bool:
+    return "seal" in getattr(kind, "__struct_fields__", ())
+
+
+def _seal_of(fields: Mapping[str, object]) -> str:
+    """Return the hash of all fields except the seal itself."""
+    others = {name: value for name, value in fields.items() if name != "seal"}
+    return content_hash(to_json(others).encode())
 
 
 def checked(document: T, where: object) -> T:

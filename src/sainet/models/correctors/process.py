@@ -51,15 +51,6 @@ class Inputs(eqx.Module):
         return jnp.stack([known[name] for name in self.names], axis=-1)
 
 
-def input_names(disks: int) -> frozenset[str]:
-    """Return the names of everything that can be an input, with so many disks."""
-    scene = Scene.disks(mass=[1.0] * disks, radius=[1.0] * disks)
-    push = jax.tree.map(
-        lambda x: jnp.asarray(x)[None], (scene, scene.in_a_row(), scene.mass, 0.0)
-    )
-    return frozenset(jax.eval_shape(known_inputs, *push))
-
-
 def known_inputs(
     scene: Scene,
     state: State,
