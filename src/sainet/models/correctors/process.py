@@ -6,7 +6,6 @@ It grows in proportion to the travel of the pusher, and has a value at every ste
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 from tinygp import kernels, transforms
