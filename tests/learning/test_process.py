@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
+from tinygp import kernels, transforms
+from tinygp.kernels.distance import L2Distance
 
 import sainet as sn
 from learning.stores import info_of, made_up
@@ -22,7 +24,7 @@ from sainet.evaluation.evaluate import evaluate
 from sainet.learning.process import _loss_and_slope, fit_process, quantile
 from sainet.learning.process_ends import ends_of
 from sainet.models.correctors import CONFIDENCE, Region
-from sainet.models.correctors.process import kernel_of
+from sainet.models.correctors.process import covariance
 from sainet.models.library import load_model
 from sainet.models.process_card import (
     ARRAYS,
@@ -370,7 +372,8 @@ def test_the_loss_is_the_density_of_scipy(pushes, inputs):
     at = np.array([0.1, -0.7, *[1.0] * inputs])
 
     def wanted(at):
-        kernel = kernel_of(jnp.exp(at[0]), jnp.exp(at[2:]))
+        matern = kernels.Matern32(distance=L2Distance())
+        kernel = jnp.exp(2 * at[0]) * transforms.Linear(jnp.exp(-at[2:]), matern)
         covariance = np.asarray(kernel(jnp.asarray(places), jnp.asarray(places)))
         covariance = covariance + np.exp(2 * at[1]) * np.eye(pushes)
         return -multivariate_normal(cov=covariance).logpdf(values)
@@ -382,3 +385,16 @@ def test_the_loss_is_the_density_of_scipy(pushes, inputs):
             step = 1e-5 * np.eye(len(at))[place]
             about = (wanted(at + step) - wanted(at - step)) / 2e-5
             assert slope[place] == pytest.approx(about, rel=1e-4, abs=1e-5)
+
+
+def test_a_covariance_has_a_slope_where_points_coincide():
+    places = jnp.asarray(np.random.default_rng(0).normal(size=(4, 3)), jnp.float32)
+
+    def total(other):
+        return covariance(jnp.float32(1.5), places, other).sum()
+
+    matern = kernels.Matern32(distance=L2Distance())
+    slope = jax.grad(total)(places)
+    wanted = jax.grad(lambda other: (2.25 * matern(places, other)).sum())(places)
+    np.testing.assert_allclose(slope, wanted, atol=1e-5)
+    assert np.abs(wanted).max() > 0.1

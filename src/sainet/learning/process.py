@@ -217,7 +217,7 @@ def _loss_and_slope(
 ) -> tuple[float, np.ndarray]:
     """Return the negative log density of values and parameters, and its gradient.
 
-    Rasmussen and Williams (2006), eq. 5.8 and 5.9, with the kernel of `kernel_of`.
+    Rasmussen and Williams (2006), eq. 5.8 and 5.9, with the `covariance` of the model.
     """
     scaled, noise = inputs / np.exp(at[2:]), np.exp(2 * at[1])
     far = np.sqrt(3 * squared_distances(scaled, scaled))

@@ -8,8 +8,6 @@ It grows in proportion to the travel of the pusher, and has a value at every ste
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
-from tinygp import kernels, transforms
-from tinygp.kernels.distance import L2Distance
 
 from sainet.models.correctors import (
     AbstractCorrector,
@@ -27,7 +25,7 @@ from sainet.scenes.state import State, Trajectory
 BODIES = 2  # at most
 RESIDUALS = 3  # of a body: along the push (m), across it (m), angle (rad)
 _SMALLEST = 1e-6  # m, a shorter travel of the pusher has no direction
-_MATERN = kernels.Matern32(distance=L2Distance())
+_SAME = 1e-12  # squared distance of points that are one
 
 
 class Inputs(eqx.Module):
@@ -110,8 +108,8 @@ class Process(eqx.Module):
         """Return the mean and the standard deviation of each output, with its noise."""
         means, deviations = [], []
         for output in range(self.mean.shape[0]):
-            kernel = kernel_of(self.amplitude[output], self.length[output])
-            across = kernel(self.inputs, inputs)  # [fitted, push]
+            amplitude, length = self.amplitude[output], self.length[output, None]
+            across = covariance(amplitude, self.inputs / length, inputs / length)
             known = jnp.sum((self.whitening[output] @ across) ** 2, axis=0)
             left = self.amplitude[output] ** 2 - known
             means.append(self.weights[output] @ across)
@@ -120,11 +118,21 @@ class Process(eqx.Module):
         return self.mean[None] + self.scale[None] * mean, self.scale[None] * deviation
 
 
-def kernel_of(
-    amplitude: Float[Array, ""], length: Float[Array, " input"]
-) -> kernels.Kernel:
-    """Return the covariance function of one output."""
-    return amplitude**2 * transforms.Linear(1 / length, _MATERN)
+def covariance(
+    amplitude: Float[Array, ""],
+    one: Float[Array, "one input"],
+    other: Float[Array, "other input"],
+) -> Float[Array, "one other"]:
+    """Return the Matern 3/2 covariance of points whose length scales are 1.
+
+    Rasmussen and Williams (2006), eq. 4.17. One product of matrices gives all squared
+    distances, in a quarter of the time of their differences.
+    """
+    sizes = jnp.sum(one**2, axis=1)[:, None] + jnp.sum(other**2, axis=1)[None]
+    squares = 3 * (sizes - 2 * one @ other.T)
+    differ = squares > _SAME  # the root has no slope at zero
+    far = jnp.where(differ, jnp.sqrt(jnp.where(differ, squares, 1.0)), 0.0)
+    return amplitude**2 * (1 + far) * jnp.exp(-far)
 
 
 class ResidualProcess(AbstractCorrector):
