@@ -319,9 +319,11 @@ def test_equal_frictions_are_exactly_the_initial_value():
 
 
 def test_an_unknown_group_lists_the_available_groups(tmp_path):
-    info = info_of(4, groups=("abs", "wood"))
-    arrays = made_up(info) | {"group": np.array([0, 1, 1, 0])}
+    info = info_of(4, groups=("abs-10", "wood", "abs-20"))
+    arrays = made_up(info) | {"group": np.array([0, 1, 1, 2])}
     store = write(tmp_path / "data", info, arrays)
     assert store.of_group("wood").rows == (1, 2)
-    with pytest.raises(BadInput, match="no group 'ice'; it has abs, wood"):
+    assert store.of_group("abs").rows == (0, 3)  # a surface
+    assert store.of_group("abs-20").rows == (3,)
+    with pytest.raises(BadInput, match="no group 'ice'; it has abs-10, wood, abs-20"):
         store.of_group("ice")

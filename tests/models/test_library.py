@@ -9,7 +9,7 @@ from models.test_checkpoint import edit_card, edit_simulator, write_network
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.models.card import CARD
 from sainet.models.dynamics import SimulatorAugmented
-from sainet.models.library import PRETRAINED, SHIPPED, load_model
+from sainet.models.library import PRETRAINED, SHIPPED, load_model, shipped_for
 from sainet.runs.errors import BadCheckpoint, MissingExtra
 from sainet.scenes.scene import TIME_STEP
 
@@ -21,6 +21,12 @@ def folder(tmp_path):
 
 def test_every_shipped_folder_has_a_name():
     assert sorted(path.name for path in PRETRAINED.iterdir()) == sorted(SHIPPED)
+
+
+def test_pushes_of_more_than_two_disks_also_have_the_network_for_any_number():
+    assert shipped_for(1) == ("in-stroke", "sain-stroke")
+    assert shipped_for(2) == ("in", "sain", "sain-bullet")
+    assert shipped_for(3) == (*shipped_for(2), "sain-any")
 
 
 @pytest.mark.parametrize("name", ["in", "sain"])

@@ -5,15 +5,18 @@ import io
 import json
 import re
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import sainet as sn
 from learning.stores import end_points_alone, info_of, made_up, write
+from sainet.cli.cross_validate import CrossValidate
 from sainet.cli.entry import run
 from sainet.datasets.store import open_store
 from sainet.models.card import read_identified
+from sainet.models.identity import ModelId
 from sainet.models.process_card import read_process_card
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadStore
@@ -86,6 +89,7 @@ def test_the_command_gives_verdict_errors_and_page(printed, command):
     page = (out / "report.html").read_text()
     assert "Is learning worth it" in page
     assert printed["page"] == str(out / "report.html")
+    assert len(printed["next"]) == 1
 
 
 def test_the_models_of_a_fold_were_fitted_to_its_training_pushes(
@@ -159,6 +163,25 @@ def test_a_script_gives_the_same_verdict(recorded, command, printed):
     assert "Physics" in str(found)
     with pytest.raises(BadStore, match="do not fill"):
         sn.cross_validate(recorded, folds=PUSHES)
+
+
+def test_the_next_commands_are_for_the_pushes_of_the_verdict():
+    gp, network = ModelId(kind="gp", features="side"), ModelId(kind="sain")
+    data, both = Path("runs/my pushes"), {"abs": 120, "plywood": 80}
+    given = CrossValidate(data=data, pushes=200)
+    assert given._commands(gp, both) == [
+        f"sainet tune gp --features side --data 'runs/my pushes' --group {each} "
+        f"--pushes {count} --out runs/model-{each}"
+        for each, count in both.items()
+    ]
+    (one,) = CrossValidate(data=Path("d"), group="abs-10")._commands(
+        network, {"abs": 9}
+    )
+    assert one == (
+        "sainet identify --data d --group abs-10 --out runs/identified && sainet tune "
+        "sain --features paper --data d --group abs-10 --out runs/model "
+        "--engine runs/identified"
+    )
 
 
 def test_candidates_come_from_the_simplest():

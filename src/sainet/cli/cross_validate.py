@@ -1,5 +1,7 @@
 """`sainet cross-validate`."""
 
+import shlex
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -42,7 +44,7 @@ class CrossValidate:
     processes (gp) and networks (sain). side: for pushes of one disk only. place: also
     at one place of one table."""
     group: str | None = None
-    """Group of pushes to use (default: all groups)."""
+    """Group of pushes to use, or surface (default: all groups)."""
     pushes: int | None = None
     """Pushes to use, from the start of the dataset (default: all)."""
     table: Path | None = None
@@ -59,6 +61,7 @@ class CrossValidate:
         from sainet.datasets.store import open_part
         from sainet.report.writers import print_table, write_table
         from sainet.studies.cross_validation import candidates_named, cross_validated
+        from sainet.studies.recorded_models import surfaces_of
         from sainet.studies.runner import MANY, Runner
         from sainet.studies.shares import collected, run_share
         from sainet.studies.study import STEPS
@@ -83,22 +86,46 @@ class CrossValidate:
         for sentence in found.coverage:
             self.output.say(sentence)
         print_table(found.table, self.output.console)
-        self.output.say(f"\nNext: {self._command(found.recommended)}\nPage: {page}")
+        counts = {name: len(rows) for name, rows in surfaces_of(store).items()}
+        following = self._commands(found.recommended, counts)
+        self.output.say("\nNext: " + "\n      ".join(following) + f"\nPage: {page}")
         if self.table is not None:
             write_table(found.table, self.table)
-        return {**found.to_json(), "page": str(page)}
+        return {**found.to_json(), "page": str(page), "next": following}
 
-    def _command(self, model: "ModelId") -> str:
-        """Return the command that makes the recommended model of all pushes."""
-        if model.kind == "physics":
-            is_identified = model.simulator and model.simulator.is_identified
-            name = "identify" if is_identified else "evaluate --model physics"
-            out = " --out runs/identified" if is_identified else ""
-            return f"sainet {name} --data {self.data}{out}"
-        given = f"--features {model.features} --data {self.data}"
-        if model.kind == "gp":
-            return f"sainet tune gp {given} --out runs/model"
-        return (
-            f"sainet identify --data {self.data} --out runs/identified && sainet tune "
-            f"sain {given} --engine runs/identified --out runs/model"
-        )
+    def _commands(self, model: "ModelId", counts: Mapping[str, int]) -> list[str]:
+        """Return the commands that make the recommended model of each surface.
+
+        Args:
+            model: the recommended one.
+            counts: number of pushes on each surface.
+        """
+        simulator = model.simulator
+        data = f"--data {shlex.quote(str(self.data))}"
+        if model.kind == "physics" and not (simulator and simulator.is_identified):
+            return [f"sainet evaluate --model physics {data}"]
+        if self.group or len(counts) == 1:
+            return [_command(model, _part(data, self.group, self.pushes), "")]
+        parts = {
+            name: _part(data, name, self.pushes and count)
+            for name, count in counts.items()
+        }
+        return [_command(model, part, f"-{name}") for name, part in parts.items()]
+
+
+def _part(data: str, group: str | None, pushes: int | None) -> str:
+    """Return the options that choose some pushes."""
+    data += f" --group {shlex.quote(group)}" if group else ""
+    return data + (f" --pushes {pushes}" if pushes else "")
+
+
+def _command(model: "ModelId", data: str, ending: str) -> str:
+    """Return the command that makes a model of all pushes that options choose."""
+    engine = f"runs/identified{ending}"
+    identify = f"sainet identify {data} --out {engine}"
+    if model.kind == "physics":
+        return identify
+    tune = f"--features {model.features} {data} --out runs/model{ending}"
+    if model.kind == "gp":
+        return f"sainet tune gp {tune}"
+    return f"{identify} && sainet tune sain {tune} --engine {engine}"

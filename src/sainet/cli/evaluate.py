@@ -25,12 +25,12 @@ class Evaluate:
 
     model: tuple[str, ...] = ()
     """Models to compare: physics, physics-true, shipped networks (in, sain,
-    sain-bullet), or run folders of trained networks. Default: physics and the shipped
-    networks that fit the data."""
+    sain-bullet, sain-any), or run folders of trained models. Default: physics and the
+    shipped networks that fit the data."""
     data: Path
     """Dataset of pushes to predict."""
     group: str | None = None
-    """Group of pushes to predict. Default: all groups."""
+    """Group of pushes to predict, or surface (default: all groups)."""
     steps: int | None = None
     """Number of steps to predict; 0 for all. Default: 200, of recorded pushes all."""
     engine: str | None = None
@@ -177,11 +177,11 @@ class Evaluate:
 
     def _fitting(self, store: "Store") -> list[str]:
         """Return physics and the shipped networks that fit; warn of the others."""
-        from sainet.models.library import OF_PAPER, OF_STROKES, PHYSICS, load_model
+        from sainet.models.library import PHYSICS, load_model, shipped_for
         from sainet.runs.errors import BadCheckpoint, MissingExtra
 
         names, info = list(PHYSICS), store.info
-        for name in OF_STROKES if info.bodies == 1 else OF_PAPER:
+        for name in shipped_for(info.bodies):
             try:
                 model = load_model(name, engine=self.engine, force=self.force)
                 if not self.force:

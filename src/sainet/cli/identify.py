@@ -16,7 +16,9 @@ class Identify:
     out: Path
     """Run folder to write, usable as a model."""
     group: str | None = None
-    """Group of pushes to use, for example abs-10. Default: all."""
+    """Group of pushes to use, for example abs-10, or surface (default: all)."""
+    pushes: int | None = None
+    """Pushes to use, from the start of the dataset (default: all)."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -26,7 +28,7 @@ class Identify:
         from sainet.identification.identify import identify_into
         from sainet.report.writers import print_estimates
 
-        store = open_part(self.data, self.group)
+        store = open_part(self.data, self.group, self.pushes)
         title = f"Fitting to {store.info.pushes} pushes"
         with progress_bar(title, None, self.output) as advance:
             found = identify_into(

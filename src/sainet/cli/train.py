@@ -37,7 +37,7 @@ class Train:
     """Internal engine of SAIN: a simulator whose prediction the dataset contains, or
     the folder of identified parameters ('sainet identify')."""
     group: str | None = None
-    """Group of pushes to train on (default: all groups)."""
+    """Group of pushes to train on, or surface (default: all groups)."""
     pushes: int | None = None
     """Pushes to train on, from the start of the dataset (default: all)."""
     single_steps: bool = False

@@ -85,7 +85,7 @@ class Tune:
     simulator whose prediction the dataset contains (default: planar for SAIN; gp
     identifies the engine on the same pushes)."""
     group: str | None = None
-    """Group of pushes to train on (default: all groups)."""
+    """Group of pushes to train on, or surface (default: all groups)."""
     pushes: int | None = None
     """Pushes to train on, from the start of the dataset (default: all)."""
     members: int | None = None

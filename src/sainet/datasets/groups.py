@@ -6,10 +6,12 @@ without a number at its end is that of a surface.
 
 import re
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sainet.datasets.store import Store
+if TYPE_CHECKING:
+    from sainet.datasets.store import Store
 
 _SPEED = re.compile(r"-\d+(\.\d+)?\Z")
 
@@ -19,7 +21,7 @@ def surface_of(group: str) -> str:
     return _SPEED.sub("", group) or group
 
 
-def groups_of(stores: Iterable[Store]) -> tuple[str, ...]:
+def groups_of(stores: "Iterable[Store]") -> tuple[str, ...]:
     """Return the names of the groups to which pushes belong; none of simulated ones."""
     found: set[str] = set()
     for store in stores:

@@ -13,6 +13,7 @@ from msgspec import structs
 
 from sainet.datasets import schema
 from sainet.datasets.check import check_files, check_values, read_info
+from sainet.datasets.groups import surface_of
 from sainet.runs.digests import BYTES
 from sainet.runs.documents import content_hash, read_document, read_file, readable
 from sainet.runs.errors import BadInput, BadStore, hint, shown
@@ -61,19 +62,22 @@ class Store:
         return replace(self, info=info, rows=chosen)
 
     def of_group(self, name: str) -> "Store":
-        """Return the pushes of one group.
+        """Return the pushes of one group, or of all groups of one surface.
 
         Raises:
             BadInput: the store has no such group.
         """
-        if name not in self.info.groups:
-            known = ", ".join(self.info.groups) or "none"
+        names = self.info.groups
+        chosen = [code for code, known in enumerate(names) if known == name] or [
+            code for code, known in enumerate(names) if surface_of(known) == name
+        ]
+        if not chosen:
             raise BadInput(
-                f"{self.path} has no group '{shown(name)}'"
-                f"{hint(name, self.info.groups)}; it has {shown(known, 120)}."
+                f"{self.path} has no group '{shown(name)}'{hint(name, names)}; it has "
+                f"{shown(', '.join(names) or 'none', 120)}."
             )
         groups = self.read(slice(None), ("group",))["group"]
-        return self.take(np.flatnonzero(groups == self.info.groups.index(name)))
+        return self.take(np.flatnonzero(np.isin(groups, chosen)))
 
     def repeats(self) -> Int[np.ndarray, " push"]:
         """Return a number for each push; repeats of one push share their number.

@@ -47,6 +47,7 @@ class Claim:
 
     text: str
     rule: Rule
+    margin: float = 0.0  # by which a model may err more, as a fraction
 
 
 def keeps_published_order(summary: Summary) -> Verdict:

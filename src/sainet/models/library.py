@@ -48,7 +48,15 @@ OF_PAPER = ("in", "sain", "sain-bullet")
 OF_STROKES = ("in-stroke", "sain-stroke")  # of one disk, as recorded on a robot
 OF_ANY_NUMBER = ("sain-any",)  # of disks: a contact network
 SHIPPED = (*OF_PAPER, *OF_STROKES, *OF_ANY_NUMBER)
+_PAPER_DISKS = 2
 MODELS = (*PHYSICS, *SHIPPED)
+
+
+def shipped_for(disks: int) -> tuple[str, ...]:
+    """Return the shipped networks to try on pushes of so many disks."""
+    if disks > _PAPER_DISKS:
+        return OF_PAPER + OF_ANY_NUMBER
+    return OF_PAPER if disks == _PAPER_DISKS else OF_STROKES
 
 
 def load_model(

@@ -75,6 +75,11 @@ class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
             raise ValueError("identity is not that of a Gaussian process")
 
     @property
+    def numbers_of_disks(self) -> tuple[int, ...]:
+        """The number of disks in the pushes of the training data."""
+        return (self.disks,)
+
+    @property
     def has_single_steps(self) -> bool:
         """False: a process predicts whole pushes."""
         return False

@@ -52,26 +52,26 @@ def doubts(
         return
     if _APART < gap < np.inf:
         yield (
-            f"no two disks are within {1000 * _APART:g} mm of each other: networks "
-            "were trained on disks that touch"
+            f"no two disks are within {1000 * _APART:g} mm of each other: the model "
+            "was trained on disks that touch"
         )
     for number, push in enumerate(pushes, start=1):
         for name in _beyond_training(push):
-            yield f"push {number}: its {name} is outside the training range of networks"
+            yield f"push {number}: its {name} is outside the model's training range"
 
 
 def doubts_of_training(card: Card | ProcessCard | None, disks: int) -> Iterator[str]:
     """Yield reasons why plans with a network may fail, from its training data.
 
     Args:
-        card: of the network; None without one.
+        card: of the trained model; None without one.
         disks: in the scene to plan in.
     """
     if card is None:
         return
     if card.trained_pushes < _FEW_PUSHES:
         yield (
-            f"its network was trained on {card.trained_pushes} pushes; give it at "
+            f"its {card.noun} was trained on {card.trained_pushes} pushes; give it at "
             f"least {_FEW_PUSHES}"
         )
     yield from doubts_of_count(card, disks)
@@ -81,17 +81,17 @@ def doubts_of_count(card: Card | ProcessCard | None, disks: int) -> Iterator[str
     """Yield a reason why predictions may fail: fewer disks than in training, or more.
 
     Args:
-        card: of the network; None without one.
+        card: of the trained model; None without one.
         disks: in the scene.
     """
     if card is None:
         return
-    trained = card.numbers_of_disks if isinstance(card, Card) else (card.disks,)
+    trained = card.numbers_of_disks
     if not trained[0] <= disks <= trained[-1]:
         known = " to ".join(map(str, sorted({trained[0], trained[-1]})))
         yield (
-            f"its network was trained on pushes of {known} disk(s), this scene "
-            f"has {disks}; train it on such pushes"
+            f"its {card.noun} was trained on pushes of {known} disk(s), this scene "
+            f"has {disks}; train one on such pushes"
         )
 
 

@@ -14,8 +14,9 @@ _SETUPS = {
     "direct-force": "a pusher that a force drives",
 }
 _REGIONS = (
-    "It states in which region a push ends with a probability of 90 %, set on pushes "
-    "that no fit saw; 'sainet evaluate' shows whether that holds on others."
+    "It states in which region a push ends with a probability of 90 %. Each push that "
+    "sets the sizes of the regions was left out of the fit that predicts it; 'sainet "
+    "evaluate' shows whether the regions hold on other pushes."
 )
 
 
@@ -84,7 +85,9 @@ def _made_of(card: Card | ProcessCard) -> str:
         if card.truth_engine == RECORDED
         else f"pushes that the engine {card.truth_engine} simulated"
     )
-    disks = f"{card.disks} disk" + ("s" if card.disks > 1 else "")
+    fewest, most = card.numbers_of_disks[0], card.numbers_of_disks[-1]
+    disks = f"{fewest} to {most} disks" if fewest < most else f"{most} disk"
+    disks += "s" if 1 < fewest == most else ""
     label = card.identity.label
     return f"{label}, from {card.trained_pushes:,} {origin}, of {disks}."
 
