@@ -10,7 +10,8 @@ from sainet.evaluation.summary import Comparison
 
 def ruled(*differences, margin=0.05, less=0.0):
     """Rule on SAIN beside an IN that errs by 2 mm on every disk."""
-    rows = [samples.row("in", body, 2.0 / 3.6) for body in range(1, len(differences) + 1)]
+    bodies = range(1, len(differences) + 1)
+    rows = [samples.row("in", body, 2.0 / 3.6) for body in bodies]
     pairs = [
         Comparison(
             condition="",
