@@ -41,8 +41,8 @@ class ControlConfig(RobotConfig):
     """Number of the target disk in the row; the disks behind it are in its way.
     Default: the last disk."""
     obstacles: int = 0
-    """Number of obstacles: so many of the last disks lie at random beside the target
-    disk's path to the goal instead of in the row (simulated)."""
+    """Number of obstacles: the last disks, placed at random beside the target disk's
+    path to the goal instead of in the row (simulated)."""
     planner: str = "greedy"
     """Planner: greedy (the paper's search) or tree (every sequence of two pushes)."""
     trials: int = 25
@@ -53,8 +53,8 @@ class ControlConfig(RobotConfig):
     """Maximum pushes per episode."""
     given_properties: GivenProperties = "true"
     """Masses and radii given to the network: true, or assumed (those of the internal
-    engine). If disks are swapped, the assumed properties follow the disks with true,
-    and stay in their order with assumed."""
+    engine). If the disks are swapped, the assumed properties follow them (true) or stay
+    in their order (assumed)."""
     property_error: float = 0.0
     """Error of the masses and radii given to the model (fraction): each is too large or
     too small by this fraction, drawn at random for each trial."""

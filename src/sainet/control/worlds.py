@@ -26,8 +26,8 @@ class TableConfig:
     moved: int | None = None
     """Number of the target disk in the row. Default: the last disk."""
     obstacles: int = 0
-    """Number of obstacles: so many of the last disks lie at random beside the target
-    disk's path to the goal instead of in the row."""
+    """Number of obstacles: the last disks, placed at random beside the target disk's
+    path to the goal instead of in the row."""
 
     def on_table(self, usual: ControlConfig) -> ControlConfig:
         """Return other settings with this world and these disks.
