@@ -20,29 +20,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class CrossValidate:
-    """Find out on your pushes whether identification or learning is worth it.
+    """Find out from your pushes whether identification or learning is worth it.
 
     Each push is predicted by models that were fitted without it. The verdict names the
-    model to use: each model, from the simplest, replaces the one before if it errs
-    clearly less in every division into folds.
+    model to use. Starting with the simplest, a model is replaced by the next one if
+    that has clearly smaller errors in every division into folds.
     """
 
     data: Path
-    """Dataset of recorded pushes, all at one table; with several surfaces as groups,
-    each has models of its own."""
+    """Dataset of recorded pushes, all on one table. If its groups are of several
+    surfaces, each surface has models of its own."""
     out: Path = Path("runs/cross-validation")
     """Folder to write: the fitted models of all folds, measurements and a page. An
-    identical call resumes; other settings use the models that are there."""
+    identical call resumes; a call with other settings uses the existing models."""
     by: tuple[Scheme, ...] = ("chain",)
-    """Divisions into folds. kind: repeats of a push stay together. chain: also pushes
-    that start where another one ended. place, direction, side (of the disk) and order
-    (of recording): test pushes lie in a part that training pushes left out."""
+    """Divisions into folds. kind: repeats of a push stay together. chain: so do pushes
+    that start where another push ended. place, direction, side (of the disk) and order
+    (of recording): test pushes lie in a part that training pushes leave out."""
     folds: int = 5
     """Number of folds."""
     models: tuple[CandidateName, ...] = USUAL_CANDIDATES
-    """Learned models beside the engine as it is and the identified engine: Gaussian
-    processes (gp) and networks (sain). side: for pushes of one disk only. place: also
-    at one place of one table."""
+    """Learned models to compare with the engine as it is and the identified engine:
+    Gaussian processes (gp) and networks (sain). side: only for pushes of one disk.
+    place: only for pushes of one disk on the same part of one table."""
     group: str | None = None
     """Group of pushes to use, or surface (default: all groups)."""
     pushes: int | None = None

@@ -32,20 +32,20 @@ class Evaluate:
     group: str | None = None
     """Group of pushes to predict, or surface (default: all groups)."""
     steps: int | None = None
-    """Number of steps to predict; 0 for all. Default: 200, of recorded pushes all."""
+    """Number of steps to predict; 0 for all. Default: 200; all for recorded pushes."""
     engine: str | None = None
-    """Internal engine of the models. Default: planar for physics, for networks the
+    """Internal engine of the models. Default: planar for physics; for networks, the
     engine of their training."""
     force: bool = False
     """Skip data and engine compatibility checks."""
     abstain: bool = False
-    """Second row for each model that names the groups it was fitted to: on other
-    surfaces physics predicts in its place. Adds physics, too."""
+    """Add a second row for each model that names the groups it was fitted to: in this
+    row, physics predicts the pushes on other surfaces. Also add a row for physics."""
     table: Path | None = None
     """File for the table: .md, .html, .tex or .csv. Default: none."""
     page: Path | None = None
-    """Page to write: the table, the verdict, errors over time, and two pushes that
-    play, in one .html file. Default: none."""
+    """Page to write, one .html file with the table, the verdict, errors over time, and
+    two animated pushes. Default: none."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     out: Path | None = None
@@ -53,8 +53,8 @@ class Evaluate:
     none."""
     shard: str | None = None
     """Share of the models to evaluate into the run folder, for example 3/8 for the
-    third of eight; the same command without a shard evaluates those that are missing
-    and prints the table. Default: all models."""
+    third of eight; the same command without a shard evaluates the missing models and
+    prints the table. Default: all models."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:

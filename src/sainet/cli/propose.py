@@ -14,7 +14,8 @@ from sainet.runs.errors import require
 class Propose:
     """Propose the next pushes to record for a Gaussian process.
 
-    Each reduces the expected variance of predictions most, after those before it.
+    Each proposed push reduces the expected variance of predictions most, given the
+    pushes proposed before it.
     """
 
     model: Positional[Path]
@@ -22,8 +23,8 @@ class Propose:
     count: int = 10
     """Number of pushes to propose."""
     pool: Path | None = None
-    """Dataset of possible pushes; without one, pushes of one disk all over the range of
-    those that the process was fitted to (default: none)."""
+    """Dataset of possible pushes. Without it, pushes of one disk are drawn from the
+    whole range of the training pushes (default: none)."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:

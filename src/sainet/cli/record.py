@@ -12,7 +12,7 @@ from sainet.control.config import CollectConfig
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """Collect pushes with a robot, and make a dataset of them."""
+    """Record pushes with a robot, and make a dataset of them."""
 
     config: CollectConfig = field(default_factory=CollectConfig)
     out: Path

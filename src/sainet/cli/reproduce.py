@@ -50,11 +50,12 @@ class Reproduce:
     """Dataset of recorded pushes, from 'sainet import mitpush-endpoints'.
     Default: none."""
     trainings: int | None = None
-    """Training runs of each network at the scale paper, at most; with 1 the whole paper
-    takes hours instead of a day. Default: up to five, as each study needs them."""
+    """Maximum training runs of each network at the scale paper; with 1 the whole paper
+    takes hours instead of a day. Default: up to five, as each study needs."""
     at_once: int | None = None
-    """Number of steps run at once, each in a process on one core and with about 1 GB;
-    with 1, one after another on all devices. Default: one per core, 1 on a GPU."""
+    """Number of steps that run at the same time, each in a process on one core and with
+    about 1 GB; with 1, steps run one after another on all devices. Default: one per
+    core, 1 on a GPU."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     machines: Machines = field(default_factory=Machines)

@@ -29,7 +29,7 @@ class Train:
     model: Positional[ModelKind]
     """Network: in (without an engine) or sain (around an engine)."""
     data: tuple[Path, ...]
-    """Dataset to train on. Several, of different numbers of disks, train one
+    """Dataset to train on. Several datasets, with different numbers of disks, train one
     network."""
     out: Path
     """Run folder; identical settings resume."""
@@ -47,9 +47,9 @@ class Train:
     """Not an option of this command: use 'sainet tune --start' (default: random
     weights)."""
     members: int | None = None
-    """Networks of an ensemble, of consecutive seeds; their mean predicts, and their
-    disagreement gives 90 % regions, calibrated on a fifth of the pushes (default: a
-    single network, without regions)."""
+    """Number of networks in an ensemble, with consecutive seeds; their mean is the
+    prediction, and their disagreement gives 90 % regions, calibrated on a fifth of the
+    pushes (default: a single network, without regions)."""
     recipe: Annotated[Recipe, AvoidSubcommands] = PAPER
     devices: int | None = None
     """CPU devices to split each batch over (default: one per core)."""

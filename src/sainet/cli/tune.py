@@ -24,7 +24,7 @@ class Changes:
     """Iterations between two halvings of the learning rate (default: 800 from the
     engine, 400 with the features 'contact', 200 from a network)."""
     l2: float | None = None
-    """Weight of the squared changes of the weights in the loss: a smaller one allows
+    """Weight of the squared changes of the weights in the loss: a smaller value allows
     larger changes (default: 1 / pushes from the engine, 0.001 from a network
     and with the features 'contact')."""
     weight_rotation: float | None = None
@@ -37,8 +37,8 @@ class Changes:
     average: int = RESIDUAL.optimiser.average
     """Span of the exponential mean of the weights (iterations); 0: the last weights."""
     linear_from: float = RESIDUAL.objective.linear_from
-    """Scaled error of a push above which the loss grows linearly, so that failed
-    recordings do not dominate; 0: squared everywhere."""
+    """Scaled error of a push above which the loss grows linearly: failed recordings
+    then do not dominate. 0: squared everywhere."""
     steps: int = RESIDUAL.horizon.steps
     """Steps of each push to train on, at most."""
     hold: int = RESIDUAL.horizon.hold
@@ -47,17 +47,18 @@ class Changes:
     """Do not mirror pushes. By default, about half of each batch is mirrored (not with
     the features 'place')."""
     validation_share: float = RESIDUAL.stopping.validation_share
-    """Share of the pushes kept for validation; training then ends with the network that
-    was best on them."""
+    """Share of the pushes kept for validation; the result is then the network with the
+    lowest validation loss."""
     patience: int = RESIDUAL.stopping.patience
     """Iterations without a better validation loss after which training stops; 0: all
     iterations."""
     features: Features | ProcessFeatures | None = None
-    """Inputs. Of a network: paper; place adds the place on the table and the absolute
-    angle, for pushes at one place of one table; contact: those of each contact in its
-    own frame, for any number of disks (only from the engine). Of a Gaussian process:
-    angle, of the contact; side adds the side of the disk; place adds both (default:
-    paper, of a Gaussian process side)."""
+    """Inputs of a network: paper; place adds the position on the table and the absolute
+    angle, for pushes on the same part of one table; contact: features of each contact
+    in its own frame, for any number of disks (only from the engine). Inputs of a
+    Gaussian process: angle is the contact angle; side adds the side of the disk; place
+    adds the side, and the position and directions on the table (default: paper; side
+    for a Gaussian process)."""
     seed: int = RESIDUAL.seed
     """Random seed."""
     log_every: int = RESIDUAL.log_every
@@ -72,14 +73,14 @@ class Tune:
     """Network: in (without an engine) or sain (around an engine). gp: a Gaussian
     process around an engine, for pushes of one or two disks."""
     data: tuple[Path, ...]
-    """Dataset to train on. Several, of different numbers of disks, train one
+    """Dataset to train on. Several datasets, with different numbers of disks, train one
     network."""
     out: Path
     """Run folder; identical settings resume."""
     start: str = FROM_ENGINE
-    """Start of training. engine: a network that adds to the motion of the internal
-    engine, at first nothing. Otherwise a shipped network, or the folder of a trained
-    one."""
+    """Start of training. engine: an additive network, whose output is added to the
+    internal engine's acceleration and is zero at first. Otherwise a shipped network, or
+    the folder of a trained network."""
     engine: str | None = None
     """Internal engine: the folder of identified parameters ('sainet identify'), or a
     simulator whose prediction the dataset contains (default: planar for SAIN; gp
@@ -89,9 +90,9 @@ class Tune:
     pushes: int | None = None
     """Pushes to train on, from the start of the dataset (default: all)."""
     members: int | None = None
-    """Networks of an ensemble, of consecutive seeds; their mean predicts, and their
-    disagreement gives 90 % regions, calibrated on a fifth of the pushes (default: a
-    single network, without regions)."""
+    """Number of networks in an ensemble, with consecutive seeds; their mean is the
+    prediction, and their disagreement gives 90 % regions, calibrated on a fifth of the
+    pushes (default: a single network, without regions)."""
     changes: Changes = field(default_factory=Changes)
     devices: int | None = None
     """CPU devices to split each batch over (default: one per core)."""

@@ -32,17 +32,17 @@ class ControlConfig(RobotConfig):
 
     model: str = "sain-any"
     """Model that plans: physics, physics-true, a shipped network, or the run
-    folder of a trained network. The default is a network for any number of disks; the
-    paper's is sain."""
+    folder of a trained network. The default is a network for any number of disks; sain
+    is the paper's network."""
     goals: Goals = "easy"
     """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
     either side)."""
     moved: int | None = None
-    """Number of the target disk in the row. Default: the last one; the disks behind
-    another one are in its way."""
+    """Number of the target disk in the row; the disks behind it are in its way.
+    Default: the last disk."""
     obstacles: int = 0
-    """How many of the disks, the last ones, lie beside the way of the target disk
-    instead of in the row, at random (simulated)."""
+    """Number of obstacles: the last disks, placed at random beside the target disk's
+    path to the goal instead of in the row (simulated)."""
     planner: str = "greedy"
     """Planner: greedy (the paper's search) or tree (every sequence of two pushes)."""
     trials: int = 25
@@ -53,14 +53,15 @@ class ControlConfig(RobotConfig):
     """Maximum pushes per episode."""
     given_properties: GivenProperties = "true"
     """Masses and radii given to the network: true, or assumed (those of the internal
-    engine). The assumed properties of swapped disks follow them, unless assumed ones
-    are given: these stay in their order."""
+    engine). If the disks are swapped, the assumed properties follow them (true) or stay
+    in their order (assumed)."""
     property_error: float = 0.0
     """Error of the masses and radii given to the model (fraction): each is too large or
-    too small by it, drawn at random for each trial."""
+    too small by this fraction, drawn at random for each trial."""
     adapt: bool = False
-    """Estimate the properties that affect pushes (radii, ratios of masses, frictions of
-    contact, pressure) from the pushes of each episode. The given ones are the start."""
+    """Estimate the properties that affect pushes (radii, ratios of masses, contact
+    frictions, pressure) from the pushes of each episode, starting from the given
+    properties."""
     tolerance: float = 0.1
     """Success tolerance (fraction of target-disk radius)."""
     stopping_tolerance: float = 0.9
@@ -70,8 +71,8 @@ class ControlConfig(RobotConfig):
     """Weight of the cosine distance in the heuristic (m); three times as large with
     three disks or more."""
     expected_cost: bool = False
-    """Judge pushes by the mean cost over where the model expects the disks, of a model
-    with regions (a Gaussian process or an ensemble)."""
+    """Judge pushes by the mean cost over the predicted distribution of final positions,
+    with a model that has regions (a Gaussian process or an ensemble)."""
     deadline: float | None = None
     """Time limit of a decision of the tree planner (s), after which it returns the best
     plan so far. Default: none."""
@@ -129,16 +130,16 @@ class CollectConfig(RobotConfig):
     pushes: int = 1500
     """Number of pushes to record."""
     seed: int = 0
-    """Random seed of pushes, places and, in simulation, of the noise."""
+    """Random seed of pushes, positions and, in simulation, of the noise."""
     repeats: int = 1
-    """Number of times that each push is made, from the same arranged poses."""
+    """Repetitions of each push, from the same arranged poses."""
     gap_mm: float = 1.0
     """Largest gap or overlap of neighbouring disks that counts as touching (mm)."""
     planner: str | None = None
     """Planner that chooses the pushes (greedy or tree), towards random goals. Default:
     random pushes."""
     model: str = "sain"
-    """Model with which pushes are planned."""
+    """Model that plans the pushes."""
     goals: Goals = "hard"
     """Goals of planned pushes: easy or hard."""
 

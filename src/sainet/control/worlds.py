@@ -24,10 +24,10 @@ class TableConfig:
     disks: int = 2
     """Number of disks; disk 1 is pushed."""
     moved: int | None = None
-    """Number of the target disk in the row. Default: the last one."""
+    """Number of the target disk in the row. Default: the last disk."""
     obstacles: int = 0
-    """How many of the disks, the last ones, lie beside the way of the target disk
-    instead of in the row, at random."""
+    """Number of obstacles: the last disks, placed at random beside the target disk's
+    path to the goal instead of in the row."""
 
     def on_table(self, usual: ControlConfig) -> ControlConfig:
         """Return other settings with this world and these disks.

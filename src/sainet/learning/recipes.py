@@ -27,7 +27,7 @@ def _require_at_least(part: object, least: int, *names: str) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Optimiser:
-    """Adam with a learning rate that falls while training goes on."""
+    """Adam with a learning rate that falls during training."""
 
     iterations: int = 10_000
     """Gradient steps."""
@@ -36,14 +36,14 @@ class Optimiser:
     learning_rate: float = 1e-3
     """Initial Adam learning rate."""
     decay: Literal["halving", "cosine"] = "halving"
-    """Fall of the learning rate: halving (the paper's) or cosine, to zero."""
+    """Fall of the learning rate: halving (as in the paper) or cosine (to zero)."""
     halve_every: int = 2_500
     """Iterations between two halvings of the learning rate."""
     clip_norm: float = 1.0
-    """Maximum norm of a gradient; longer ones are shortened to it."""
+    """Maximum norm of a gradient; larger gradients are scaled down to it."""
     average: int = 0
-    """Span of the exponential mean of the weights (iterations), with which training
-    ends, since long pushes respond to every step of the weights; 0: the last ones."""
+    """Span of the exponential mean of the weights (iterations), which is the result of
+    training, because long pushes are sensitive to every step; 0: the last weights."""
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
@@ -59,9 +59,9 @@ class Objective:
     """The loss: weighted squared errors of the motion (eq. 3) and l2."""
 
     l2: float | None = 1e-6
-    """Weight of the squared weights in the loss (the paper's 1e-3 is for a loss in
-    metres, this one is scaled); of their squared changes where training starts from a
-    network or the engine. None: 1 / pushes, so that few pushes change little."""
+    """Weight of the squared weights in the loss, or of their squared changes from a
+    network or the engine at the start. (The paper's 1e-3 is for a loss in metres; this
+    loss is scaled.) None: 1 / pushes, with which few pushes change little."""
     weight_position: float = 1.0
     """Weight of positions in the scaled loss."""
     weight_rotation: float = 1.0
@@ -75,8 +75,8 @@ class Objective:
     error: the mean squared error of the simulator prediction. metres: none, as in the
     paper's loss, in SI units."""
     linear_from: float = 0.0
-    """Scaled error of a push above which the loss grows linearly, no longer squared, so
-    that failed recordings do not dominate; 0: squared everywhere."""
+    """Scaled error of a push above which the loss grows linearly instead of
+    quadratically: failed recordings then do not dominate. 0: squared everywhere."""
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
@@ -106,7 +106,7 @@ class WholePush:
     """Zero-order-hold length for additive networks (steps): training computes their
     output once and reuses it. Predictions never hold it."""
     short_iterations: int = 0
-    """First iterations, in which pushes end after a quarter of the steps."""
+    """Number of first iterations in which pushes end after a quarter of the steps."""
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
@@ -135,8 +135,8 @@ class Augmentation:
     """Changes to the pushes of each batch that leave physics the same."""
 
     mirror: bool = False
-    """Mirror about half of the pushes of each batch, drawn anew each time: on an even
-    table, left and right are alike. Without effect with the features 'place'."""
+    """Mirror about half of the pushes of each batch, drawn at random each time: on an
+    even table, left and right are alike. No effect with the features 'place'."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,8 +144,8 @@ class Stopping:
     """Validation on pushes that are not trained on, and early stopping."""
 
     validation_share: float = 0.0
-    """Share of the pushes kept for validation, drawn at random; training then ends with
-    the network that was best on them."""
+    """Share of the pushes kept for validation, drawn at random; the result is then the
+    network with the lowest validation loss."""
     patience: int = 0
     """Iterations without a better validation loss after which training stops; 0: all
     iterations."""
@@ -192,12 +192,12 @@ class Recipe:
     stopping: Stopping = Stopping()
     start: Start = Fresh()
     features: Features = "paper"
-    """Features of the network. place: also the place on the table and the absolute
-    angle, with which the friction of a real surface varies. contact: those of each
-    contact in its own frame (only around an engine). letter: those of the paper's
-    equations in SI units, along the table. letter-push-frame: the same in the push
-    frame. whole-state: a feedforward network, for as many disks as in training.
-    nominal: the paper's, of assumed masses and radii."""
+    """Features of the network. place: also the position on the table and the absolute
+    angle, with which the friction of a real surface varies. contact: features of each
+    contact in its own frame (only around an engine). letter: the inputs of the paper's
+    equations in SI units, along the table's axes. letter-push-frame: the same in the
+    push frame. whole-state: a feedforward network, for as many disks as in training.
+    nominal: the paper's features, with assumed masses and radii."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""

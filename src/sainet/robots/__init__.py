@@ -29,8 +29,8 @@ class RobotConfig:
     """What executes pushes: a simulated robot, a virtual lab, or a physical robot."""
 
     robot: str = "simulated"
-    """Robot: simulated (by an engine of models), lab (a virtual lab, simulated in 3-D
-    by MuJoCo) or abb (a physical robot)."""
+    """Robot: simulated (by the planar engine or Bullet), lab (a virtual lab, simulated
+    in 3-D by MuJoCo) or abb (a physical robot)."""
     world: str = "planar"
     """Engine of the simulated world: planar, or bullet as in the paper."""
     disks: int = 2
@@ -44,8 +44,8 @@ class RobotConfig:
     swapped: bool = False
     """Exchange the two disks of the virtual lab, so that the larger one is pushed."""
     area_mm: float = 300.0
-    """Side of the square around the table's origin that disks are arranged in, with
-    their centres (mm; lab and abb)."""
+    """Side of the square around the table's origin in which the centres of the disks
+    are arranged (mm; lab and abb)."""
     config: Path | None = None
     """Configuration of the cell of the physical robot (TOML). Default: none."""
     # Not part of any run: nothing is recorded.

@@ -41,8 +41,9 @@ class Machines:
     work instead of processes on this machine (extra cluster). Default: none."""
     shard: str | None = None
     """Share of the independent pieces to do, for example 3/8 for the third of eight.
-    Shards may run at once, on any machines that share the folder; the same command
-    without a shard makes what is missing and finishes. Default: everything."""
+    Shards may run at the same time, on any machines that share the folder; the same
+    command without a shard makes the missing pieces and finishes. Default: all
+    pieces."""
 
     @property
     def share(self) -> Shard | None:

@@ -19,18 +19,18 @@ class PlayConfig(TableConfig):
     """Address of the page, and the scene that it starts with."""
 
     model: tuple[str, ...] = ("physics", "in", "sain")
-    """Models whose predictions the page shows, or folders of trained networks; the last
-    plans at first."""
+    """Models whose predictions the page shows, or folders of trained networks; at first
+    the last model plans."""
     goals: Goals = "hard"
-    """Goals that are drawn: easy (within 30 degrees of the disks' axis) or hard (30 to
+    """Drawn goals: easy (within 30 degrees of the disks' axis) or hard (30 to
     60 degrees to either side)."""
     seed: int = 0
     """Random seed of goals, friction and noise."""
     port: int = 8642
     """Port of the page; 0 takes any free port."""
     host: str = "127.0.0.1"
-    """Address to listen on. Anybody who can reach another address than a loopback
-    address can use the page."""
+    """Address to listen on. If it is not a loopback address, anybody who can reach it
+    can use the page."""
     name: tuple[str, ...] = ()
     """Further host names under which browsers may open the page. Default: none."""
     out: Path = Path("runs/play")
