@@ -1,5 +1,6 @@
 """`sainet cross-validate`."""
 
+import shlex
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,15 +91,17 @@ class CrossValidate:
 
     def _command(self, model: "ModelId") -> str:
         """Return the command that makes the recommended model of all pushes."""
+        group = ["--group", self.group] if self.group is not None else []
+        data = shlex.join(["--data", str(self.data), *group])
         if model.kind == "physics":
             is_identified = model.simulator and model.simulator.is_identified
             name = "identify" if is_identified else "evaluate --model physics"
             out = " --out runs/identified" if is_identified else ""
-            return f"sainet {name} --data {self.data}{out}"
-        given = f"--features {model.features} --data {self.data}"
+            return f"sainet {name} {data}{out}"
+        given = f"--features {model.features} {data}"
         if model.kind == "gp":
             return f"sainet tune gp {given} --out runs/model"
         return (
-            f"sainet identify --data {self.data} --out runs/identified && sainet tune "
-            f"sain {given} --engine runs/identified --out runs/model"
+            f"sainet identify {data} --out runs/identified && sainet tune sain {given} "
+            "--engine runs/identified --out runs/model"
         )
