@@ -123,7 +123,7 @@ def tune(
         return _fitted(store_of(pushes), settings, engine, out, progress)
     if features is not None:
         raise BadInput("`features` is of `gp`; give `recipe` those of a network.")
-    begun = recipe_for(start_named(_start_name(start))) if recipe is None else recipe
+    begun = _recipe(start, recipe)
     settings = begun.changed(**{k: v for k, v in given.items() if v is not None})
     total = settings.optimiser.iterations
     with _folder(out) as folder:
@@ -138,6 +138,23 @@ def tune(
             )
         found = load(folder)
     return found if out is not None else found.without_folder()
+
+
+def _recipe(start: Folder | Model, recipe: Recipe | None) -> Recipe:
+    """Return the recipe that fits a start, or the one that is given.
+
+    Raises:
+        BadInput: the recipe has another start than the one that is given.
+    """
+    wanted = start_named(_start_name(start))
+    if recipe is None:
+        return recipe_for(wanted)
+    if start != FROM_ENGINE and recipe.start != wanted:
+        raise BadInput(
+            f"`start` is {_start_name(start)}, and `recipe` has another start; leave "
+            "`start` out, or give `recipe_for` that start."
+        )
+    return recipe
 
 
 def _fitted(
