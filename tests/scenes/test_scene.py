@@ -3,6 +3,7 @@
 import inspect
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -111,6 +112,12 @@ def test_a_scene_of_plain_numbers_is_checked():
         Scene.disks([1.0, 1.0], [0.05])
     with pytest.raises(BadScene, match="time_step is 0; it must be from"):
         Scene.disks([1.0], [0.05], time_step=0.0)
+
+
+def test_whole_numbers_become_real_ones():
+    make = inspect.unwrap(at_rest)  # without the types of the tests
+    state = make(np.array([[0, 0], [1, 0]]), np.zeros(2, int), jnp.zeros(2, int))
+    assert {leaf.dtype for leaf in jax.tree.leaves(state)} == {jnp.dtype("float32")}
 
 
 @pytest.mark.parametrize(

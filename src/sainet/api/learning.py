@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager, nullcontext
 from os import PathLike, fspath
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 from sainet.api.models import Loadable, load
 from sainet.api.progress import shown_progress
@@ -17,12 +17,12 @@ from sainet.learning.fit import fit
 from sainet.learning.log import reported
 from sainet.learning.process import fit_process, fits_of
 from sainet.learning.recipes import FROM_ENGINE, Recipe, recipe_for, start_named
-from sainet.models.identity import ModelKind, ProcessFeatures
+from sainet.models.identity import NETWORKS, ModelKind, ProcessFeatures
 from sainet.models.library import find_internal_engine, identified_physics
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.documents import checked
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, require_one_of
 
 Folder = PathLike[str] | str
 
@@ -112,6 +112,7 @@ def tune(
         RunConflict: the folder belongs to another run.
         Diverged: the loss became NaN or infinite.
     """
+    require_one_of("model", model, (*NETWORKS, "gp"))
     given = {"iterations": iterations, "seed": seed}
     if model == "gp":
         if recipe is not None or start != FROM_ENGINE:
@@ -119,6 +120,7 @@ def tune(
         chosen = {
             k: v for k, v in {**given, "features": features}.items() if v is not None
         }
+        require_one_of("features", features or "side", get_args(ProcessFeatures))
         settings = checked(ProcessSettings(**cast(Any, chosen)), "gp")
         return _fitted(store_of(pushes), settings, engine, out, progress)
     if features is not None:

@@ -6,13 +6,15 @@ Free of JAX.
 
 import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
+from numbers import Real
 from typing import ClassVar, Literal
 
 import msgspec
 
 from sainet.models.card import TrainingSettings
 from sainet.models.identity import Features
-from sainet.runs.errors import require, unknown_name
+from sainet.runs.documents import reason
+from sainet.runs.errors import BadInput, require, unknown_name
 
 Terms = Literal["motion", "error", "metres"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
@@ -22,7 +24,11 @@ def _require_at_least(part: object, least: int, *names: str) -> None:
     wanted = "at least 1" if least else "0 or more"
     for name in names:
         value = getattr(part, name)
-        require(math.isfinite(value) and value >= least, name, wanted, value)
+        require(_is_number(value) and value >= least, name, wanted, value)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and math.isfinite(value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +57,7 @@ class Optimiser:
         _require_at_least(self, 0, "average")
         for name in ("learning_rate", "clip_norm"):
             value = getattr(self, name)
-            require(math.isfinite(value) and value > 0, name, "positive", value)
+            require(_is_number(value) and value > 0, name, "positive", value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,10 +250,14 @@ class Recipe:
         Raises:
             BadInput: a setting has a wrong type.
         """
-        flat: dict[str, object] = {"horizon": self.horizon.kind}
+        flat: dict[str, object] = {}
         for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
-        return msgspec.convert(flat | {"horizon": self.horizon.kind}, TrainingSettings)
+        flat["horizon"] = self.horizon.kind
+        try:
+            return msgspec.convert(flat, TrainingSettings)
+        except msgspec.ValidationError as cause:
+            raise BadInput(f"recipe: {reason(cause)}; give another value.") from None
 
 
 PAPER = Recipe()

@@ -5,6 +5,7 @@ are optional; there is at least one disk.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -99,7 +100,9 @@ class Scene(eqx.Module):
             if np.ndim(value):
                 raise BadScene(f"scene: {name} is {shown(value)}; give one number.")
         given = {**disks, **single}
-        fields = {name: jnp.asarray(each, jnp.float32) for name, each in given.items()}
+        fields: dict[str, Any] = {
+            name: jnp.asarray(each, jnp.float32) for name, each in given.items()
+        }
         scene = cls(**fields, time_step=time_step)
         check_scene(scene)
         return scene

@@ -1,7 +1,6 @@
 """Many environments `sainet/PushDisks-v0` at once, in planar worlds."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -174,7 +173,7 @@ def _seeds(seed: int | np.integer | Sequence[int], count: int) -> np.ndarray:
     Raises:
         BadInput: their number is another one, or a seed is no whole number from 0.
     """
-    if isinstance(seed, Integral):  # NumPy's whole numbers, too
+    if isinstance(seed, int | np.integer):
         seed = range(int(seed), int(seed) + count)
     each = list(seed)
     if len(each) != count:
