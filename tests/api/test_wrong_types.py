@@ -36,8 +36,8 @@ LINES = [
     "BadSetting `model` is foo; it must be one of in, sain, gp.",
     "BadSetting `features` is bogus; it must be one of angle, side, place.",
     "BadSetting `iterations` is 3; it must be at least 1.",
-    "BadInput recipe: iterations: expected `int`, got `float`; give another value.",
-    "BadInput recipe: mirror: expected `bool`, got `str`; give another value.",
+    "BadInput recipe: iterations: expected `int`, got `float`.",
+    "BadInput recipe: mirror: expected `bool`, got `str`.",
     "UnknownName No candidate named 'foo'. Available: gp-angle, gp-place, gp-side, "
     "sain, sain-place.",
 ]

@@ -7,14 +7,12 @@ Free of JAX.
 import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from numbers import Real
-from typing import ClassVar, Literal
-
-import msgspec
+from typing import Any, ClassVar, Literal
 
 from sainet.models.card import TrainingSettings
 from sainet.models.identity import Features
-from sainet.runs.documents import reason
-from sainet.runs.errors import BadInput, require, unknown_name
+from sainet.runs.documents import checked
+from sainet.runs.errors import require, unknown_name
 
 Terms = Literal["motion", "error", "metres"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
@@ -24,11 +22,8 @@ def _require_at_least(part: object, least: int, *names: str) -> None:
     wanted = "at least 1" if least else "0 or more"
     for name in names:
         value = getattr(part, name)
-        require(_is_number(value) and value >= least, name, wanted, value)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and math.isfinite(value)
+        good = isinstance(value, Real) and math.isfinite(value) and value >= least
+        require(good, name, wanted, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +49,9 @@ class Optimiser:
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
         _require_at_least(self, 1, "iterations", "batch_size", "halve_every")
-        _require_at_least(self, 0, "average")
+        _require_at_least(self, 0, "average", "learning_rate", "clip_norm")
         for name in ("learning_rate", "clip_norm"):
-            value = getattr(self, name)
-            require(_is_number(value) and value > 0, name, "positive", value)
+            require(getattr(self, name) > 0, name, "positive", getattr(self, name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,14 +244,10 @@ class Recipe:
         Raises:
             BadInput: a setting has a wrong type.
         """
-        flat: dict[str, object] = {}
+        flat: dict[str, Any] = {}
         for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
-        flat["horizon"] = self.horizon.kind
-        try:
-            return msgspec.convert(flat, TrainingSettings)
-        except msgspec.ValidationError as cause:
-            raise BadInput(f"recipe: {reason(cause)}; give another value.") from None
+        return checked(TrainingSettings(horizon=self.horizon.kind, **flat), "recipe")
 
 
 PAPER = Recipe()

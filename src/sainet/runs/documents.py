@@ -114,7 +114,7 @@ def read_json(path: Path, error: type[BadInput] = BadInput) -> dict[str, Any]:
     try:
         value = msgspec.json.decode(read_file(path, error=error))
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
-        raise error(f"{path}: cannot be read as JSON ({reason(cause)}).") from None
+        raise error(f"{path}: cannot be read as JSON ({_reason(cause)}).") from None
     if not isinstance(value, dict):
         raise error(f"{path}: must hold a JSON object, not a {type(value).__name__}.")
     return value
@@ -182,7 +182,7 @@ def read_document(
         _check_version(path, data, kind, error)
         return decode(data, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
-        raise error(f"{path}: {reason(cause)}.{advice}") from None
+        raise error(f"{path}: {_reason(cause)}.{advice}") from None
 
 
 def write_document(path: Path, document: msgspec.Struct) -> None:
@@ -204,7 +204,7 @@ def checked(document: T, where: object) -> T:
     try:
         return msgspec.convert(msgspec.to_builtins(document), type(document))
     except msgspec.MsgspecError as cause:
-        raise BadInput(f"{where}: {reason(cause)}.") from None
+        raise BadInput(f"{where}: {_reason(cause)}.") from None
 
 
 class _Versioned(msgspec.Struct):
@@ -227,7 +227,7 @@ def _check_version(path: Path, data: bytes, kind: type, error: type[BadInput]) -
     )
 
 
-def reason(cause: Exception) -> str:
+def _reason(cause: Exception) -> str:
     """Return why a document was refused, with the field first."""
     if isinstance(cause, RecursionError):
         return "nested too deeply"
