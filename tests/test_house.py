@@ -338,6 +338,7 @@ CONNECTIONS = {
     "cross-validation": 10,
     "ensembles": 62,
     "provenance of identified engines": 10,
+    "wrong arguments, settings without effect, full disks": 89,
     "contact networks and arrangements of disks": 165,
     "obstacles and other target disks": 25,
     "episodes of several models side by side": 50,

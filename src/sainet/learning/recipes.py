@@ -6,7 +6,6 @@ Free of JAX.
 
 import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from numbers import Real
 from typing import Any, ClassVar, Literal
 
 from sainet.models.card import TrainingSettings
@@ -22,8 +21,8 @@ def _require_at_least(part: object, least: int, *names: str) -> None:
     wanted = "at least 1" if least else "0 or more"
     for name in names:
         value = getattr(part, name)
-        good = isinstance(value, Real) and math.isfinite(value) and value >= least
-        require(good, name, wanted, value)
+        is_known = isinstance(value, int | float) and math.isfinite(value)
+        require(is_known and value >= least, name, wanted, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,10 +243,10 @@ class Recipe:
         Raises:
             BadInput: a setting has a wrong type.
         """
-        flat: dict[str, Any] = {}
+        flat: dict[str, Any] = {"horizon": self.horizon.kind}
         for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
-        return checked(TrainingSettings(horizon=self.horizon.kind, **flat), "recipe")
+        return checked(TrainingSettings(**flat), "recipe")
 
 
 PAPER = Recipe()
