@@ -370,7 +370,7 @@ COUNTS = {
                 set(modules_of(WAY_IN)) - set(modules_of(MJCF + VALIDATION + TRUST)),
             )
         ),
-        3_540,
+        3_578,
         3_540,
     ),
     "code lines of engines from MJCF": (
