@@ -338,6 +338,7 @@ CONNECTIONS = {
     "cross-validation": 10,
     "ensembles": 62,
     "provenance of identified engines": 10,
+    "wrong arguments, settings without effect, full disks": 89,
     "contact networks and arrangements of disks": 165,
     "obstacles and other target disks": 25,
     "episodes of several models side by side": 50,
@@ -369,7 +370,7 @@ COUNTS = {
                 set(modules_of(WAY_IN)) - set(modules_of(MJCF + VALIDATION + TRUST)),
             )
         ),
-        3_540,
+        3_578,
         3_540,
     ),
     "code lines of engines from MJCF": (

@@ -138,6 +138,27 @@ def test_parts_that_do_not_fit_are_refused():
         physics.predict(SCENE, two, sn.Push(ANGLES))
 
 
+def test_no_pushes_have_an_empty_prediction(model):
+    none = sn.Push(contact_angle=np.zeros(0))
+    for steps in (None, 5):
+        found = model.predict(SCENE, SCENE.in_a_row(), none, steps=steps)
+        assert found.states.position.shape == (0, steps or 200, 2, 2)
+        assert found.final.pusher_position.shape == (0, 2)
+
+
+def test_a_second_leading_axis_is_refused(model):
+    pushes = sn.Push(contact_angle=np.zeros((2, 3)))
+    with pytest.raises(BadScene, match=r"are \(\), \(\), \(2, 3\); give one axis"):
+        model.predict(SCENE, SCENE.in_a_row(), pushes)
+
+
+@pytest.mark.parametrize("steps", [0, -1])
+def test_a_number_of_steps_that_cannot_be_predicted_is_refused(steps):
+    physics, state = sn.load("physics"), SCENE.in_a_row()
+    with pytest.raises(BadInput, match=f"`steps` is {steps}; it must be at least 1"):
+        physics.predict(SCENE, state, sn.Push(0.0), steps=steps)
+
+
 def test_networks_refuse_another_time_step():
     fine = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059], time_step=1 / 480)
     with pytest.raises(BadCheckpoint, match="give the scene the same time step"):

@@ -151,6 +151,8 @@ def test_engines_and_starts_that_cannot_be_used_are_refused(pushes):
         sn.tune("sain", pushes, engine="in")
     with pytest.raises(BadInput, match="`start` is physics, which has no folder"):
         sn.tune("sain", pushes, start=sn.load("physics"))
+    with pytest.raises(BadInput, match="`start` is sain, and `recipe` has another"):
+        sn.tune("sain", pushes, start="sain", recipe=sn.Recipe())
 
 
 def test_a_model_of_a_folder_is_trained_further(pushes, tmp_path):

@@ -310,7 +310,7 @@ def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
     assert "--start is sain; it must be left out: it is a setting of networks" in error
     words = ("tune", "sain", "--data", pushes, "--out", tmp_path / "net")
     error = sainet(*words, "--features", "side", status=2).stderr
-    assert "--features is side; it must be paper or place for a network" in error
+    assert "--features is side; it must be paper, place or contact for a" in error
 
 
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from report.samples import record
 from sainet.cli import control
 from sainet.cli.control import Control
+from sainet.cli.entry import run as called
 from sainet.control.config import ControlConfig
 
 
@@ -44,3 +45,26 @@ def test_the_command_on_the_page_parses():
     swapped = ControlConfig(robot="lab", swapped=True)
     words = shlex.split(control._command(swapped))
     assert words[2:] == ["--robot", "lab", "--swapped", "--animate"]
+
+
+@pytest.mark.parametrize(
+    ("words", "where"),
+    [
+        ("control --surface plywood", "--robot is lab"),
+        ("control --lab 2", "--robot is lab"),
+        ("control --area-mm 200", "--robot is lab or abb"),
+        ("control --robot lab --world bullet", "--robot is simulated"),
+        ("control --robot lab --noise-level none", "--robot is simulated"),
+        ("record --surface plywood", "--robot is lab"),
+        ("record --model physics", "--planner is given"),
+        ("record --goals easy", "--planner is given"),
+    ],
+)
+def test_a_setting_without_effect_is_refused(words, where, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert called([*words.split(), "--out", str(out)]) == 2
+    name, value = words.split()[-2:]
+    value = f"{float(value)}" if name == "--area-mm" else value
+    text = f"sainet: {name} is {value}; it must be left out unless {where}.\n"
+    assert capsys.readouterr().err == text
+    assert not out.exists()

@@ -18,6 +18,12 @@ def test_settings_become_options_of_the_command():
     assert message(nested, Generate) == "reduce --tracking-mm or choose another --out"
 
 
+@pytest.mark.parametrize("name", ["iterations", "learning_rate", "hold", "patience"])
+def test_settings_of_recipes_become_options(name):
+    flag = f"--{name.replace('_', '-')}"
+    assert message(BadSetting(name, 0, "good"), Train).startswith(f"{flag} is 0")
+
+
 def test_what_is_no_option_stays_a_name():
     error = BadInput("`model` and `chunk_size` are wrong")  # `model` is positional
     assert message(error, Train) == str(error)

@@ -1,6 +1,10 @@
 """What commands print stays as it is: paths are not markup, commands are not broken."""
 
+import os
+import subprocess
+import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -91,3 +95,34 @@ def test_each_step_has_a_bar_of_its_own_that_counts_to_its_end(monkeypatch):
             bars(Progress(title, 5, 5, has_ended=True))
         bars(Progress("Predicting", 1, 3))
     assert seen == [("Simulating", 5, 5), ("Training", 5, 5), ("Predicting", 3, 1)]
+
+
+def called(*words, out=subprocess.PIPE, **environment):
+    """The end of a process of its own: sainet with these words."""
+    return subprocess.run(
+        [sys.executable, "-m", "sainet", *words],
+        stdout=out,
+        stderr=subprocess.PIPE,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+def test_a_terminal_without_some_characters_shows_others():
+    done = called("--help", PYTHONIOENCODING="ascii", PYTHONUTF8="0")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "? demo" in done.stdout  # instead of a bullet
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_output_to_a_full_disk_ends_in_one_line(options, tmp_path):
+    (tmp_path / "config.json").write_text('{"command": "demo"}')
+    (tmp_path / "report.html").write_text("")
+    with open("/dev/full", "w") as full:
+        done = called("report", str(tmp_path), *options, out=full)
+    assert done.returncode == 2
+    text = "output: the disk is full; make room, or write to another.\n"
+    assert done.stderr.endswith(text)
+    assert done.stderr.count("\n") == 1 + bool(options)

@@ -184,6 +184,8 @@ def test_bad_options_of_reset_are_named_and_lose_nothing(options, says):
         ({"disks": 50}, "`disks` is 50; .*2 m long"),
         ({"obstacles": 1}, "`obstacles` is 1"),
         ({"moved": 3}, "`moved` is 3"),
+        ({"surface": "plywood"}, "`surface` is plywood; .* outside the world lab"),
+        ({"lab": 2}, "`lab` is 2"),
     ],
 )
 def test_impossible_options_are_named(options, says):
@@ -224,7 +226,11 @@ def test_a_policy_refuses_other_observations():
     policy = sn.TreePlanner(sn.load_model("physics"), env.unwrapped.task)
     observation, _ = env.reset(seed=0)
     observation["observation"] = observation["observation"][:3]
-    with pytest.raises(BadInput, match=r"no poses of shape \(6,\)"):
+    with pytest.raises(BadInput, match=r"no numbers of shape \(6,\) under 'obs"):
+        policy.act(observation)
+    observation, _ = env.reset(seed=0)
+    del observation["desired_goal"]
+    with pytest.raises(BadInput, match=r"no numbers of shape \(2,\) under 'desired"):
         policy.act(observation)
 
 
@@ -306,6 +312,13 @@ def test_many_environments_are_reproducible_with_noise():
 
     for one, other in zip(results(), results(), strict=True):
         assert_same(one, other)
+
+
+def test_many_environments_take_the_whole_numbers_of_numpy_as_seeds(many):
+    wanted = many.reset(seed=3)[0]["desired_goal"]
+    np.testing.assert_array_equal(
+        many.reset(seed=np.int64(3))[0]["desired_goal"], wanted
+    )
 
 
 def test_many_environments_declare_their_autoreset(many):

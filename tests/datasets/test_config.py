@@ -9,6 +9,7 @@ import pytest
 from sainet.cli.entry import run
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.errors import BadInput, BadSetting
+from sainet.scenes.quantities import require_count
 from sainet.worlds.config import bounds
 from sainet.worlds.noise import NoiseConfig
 from support import SOURCE
@@ -62,6 +63,12 @@ BAD = [
     ("stroke_mm", (1e-6,)),
     ("force_n", 1e300),
 ]
+
+
+@pytest.mark.parametrize("value", [None, "3", 3.0, [3], 0])
+def test_what_is_no_count_is_refused_by_name(value):
+    with pytest.raises(BadSetting, match="^`pushes` is .*; it must be (a whole|at)"):
+        require_count("pushes", value)
 
 
 @pytest.mark.parametrize(("name", "value"), BAD)

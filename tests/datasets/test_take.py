@@ -63,3 +63,11 @@ def test_the_content_hash_depends_on_the_taken_pushes(store):
 def test_only_stored_pushes_can_be_taken(store, rows, says):
     with pytest.raises(BadInput, match=says):
         store.take(rows)
+
+
+@pytest.mark.parametrize(
+    "rows", [np.arange(12) > 5, [True, False], np.array([1.5]), np.array([[0, 1]])]
+)
+def test_masks_and_fractions_are_no_indices(store, rows):
+    with pytest.raises(BadInput, match=r"`rows` is .*; it must be whole numbers"):
+        store.take(rows)

@@ -10,6 +10,7 @@ from sainet.evaluation.joining import pool_trainings
 from sainet.evaluation.measurements import Condition, Header, measurements_of
 from sainet.evaluation.metrics import (
     MEASURED,
+    ModelErrors,
     final_errors,
     final_pose,
     push_errors,
@@ -278,3 +279,14 @@ def test_a_model_does_not_differ_from_itself():
     for row in rows:
         assert (row["difference"], row["interval"]) == (0, [0, 0])
         assert (row["model"], row["against"]) == ("a", "b")
+
+
+def test_errors_over_the_travel_of_a_resting_body_are_unknown():
+    travel = np.full((12, 3), 10.0)  # mm
+    travel[:, 1] = 0.0
+    travel[1:, 2] = 0.0  # moves in one push, which some resamples lack
+    known = ModelErrors({"final_pos_mm": np.full((12, 3), 2.0)}, travel, 0.25)
+    value, low, high = known.per_travel("final_pos_mm")
+    np.testing.assert_allclose(value, [20, np.nan, 240])
+    np.testing.assert_allclose(low, [20, np.nan, np.nan])
+    np.testing.assert_allclose(high, [20, np.nan, np.nan])

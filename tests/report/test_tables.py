@@ -226,6 +226,18 @@ def test_hostile_names_stay_text():
     assert "[red]" in printed(result, 200)
 
 
+def test_names_mean_nothing_to_latex():
+    name = r"[a^b~c] \d{e} <f>|g_h"
+    result = msgspec.structs.replace(
+        samples.result(), rows=(samples.row(name, 1, 0.3),), models=()
+    )
+    (line,) = [line for line in to_latex(arrange(result)).splitlines() if "g" in line]
+    assert line.startswith(
+        r"{[}a\textasciicircum{}b\textasciitilde{}c] \textbackslash{}d\{e\} "
+        r"\textless{}f\textgreater{}\textbar{}g\_h & "
+    )
+
+
 @pytest.mark.parametrize("ending", WRITERS)
 def test_a_table_is_written_in_the_format_of_its_file(tmp_path, ending):
     path = tmp_path / f"table{ending}"

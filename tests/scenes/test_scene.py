@@ -1,6 +1,9 @@
 """Scenes, states and trajectories."""
 
+import inspect
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -109,3 +112,28 @@ def test_a_scene_of_plain_numbers_is_checked():
         Scene.disks([1.0, 1.0], [0.05])
     with pytest.raises(BadScene, match="time_step is 0; it must be from"):
         Scene.disks([1.0], [0.05], time_step=0.0)
+
+
+def test_whole_numbers_become_real_ones():
+    make = inspect.unwrap(at_rest)  # without the types of the tests
+    state = make(np.array([[0, 0], [1, 0]]), np.zeros(2, int), jnp.zeros(2, int))
+    assert {leaf.dtype for leaf in jax.tree.leaves(state)} == {jnp.dtype("float32")}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"mass": [], "radius": []}, r"mass has the shape \[0\]"),
+        ({"mass": [[1.0, 1.0]]}, r"mass has the shape \[1, 2\]"),
+        ({"radius": np.float32(0.05)}, r"radius has the shape \[\]"),
+        (
+            {"table_friction": np.array([0.1, 0.2])},
+            r"table_friction is \[0.1 0.2\]; give one",
+        ),
+    ],
+)
+def test_disks_have_one_number_each_and_scenes_one_friction(given, words):
+    usual = {"mass": [1.0, 1.0], "radius": [0.05, 0.05]}
+    make = inspect.unwrap(Scene.disks.__func__)  # without the types of the tests
+    with pytest.raises(BadScene, match=words):
+        make(Scene, **{**usual, **given})

@@ -40,7 +40,7 @@ def evaluate(
             groups.
         Diverged: a prediction is not finite.
     """
-    if isinstance(models, str):
+    if isinstance(models, str | Model):
         raise BadInput(
             f"`models` is '{models}'; give a list, or a model for each name."
         )

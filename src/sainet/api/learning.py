@@ -4,7 +4,7 @@ from contextlib import AbstractContextManager, nullcontext
 from os import PathLike, fspath
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Literal, cast
+from typing import Any, Literal, cast, get_args
 
 from sainet.api.models import Loadable, load
 from sainet.api.progress import shown_progress
@@ -17,12 +17,12 @@ from sainet.learning.fit import fit
 from sainet.learning.log import reported
 from sainet.learning.process import fit_process, fits_of
 from sainet.learning.recipes import FROM_ENGINE, Recipe, recipe_for, start_named
-from sainet.models.identity import ModelKind, ProcessFeatures
+from sainet.models.identity import NETWORKS, ModelKind, ProcessFeatures
 from sainet.models.library import find_internal_engine, identified_physics
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.documents import checked
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, require_one_of
 
 Folder = PathLike[str] | str
 
@@ -112,6 +112,7 @@ def tune(
         RunConflict: the folder belongs to another run.
         Diverged: the loss became NaN or infinite.
     """
+    require_one_of("model", model, (*NETWORKS, "gp"))
     given = {"iterations": iterations, "seed": seed}
     if model == "gp":
         if recipe is not None or start != FROM_ENGINE:
@@ -119,11 +120,12 @@ def tune(
         chosen = {
             k: v for k, v in {**given, "features": features}.items() if v is not None
         }
+        require_one_of("features", features or "side", get_args(ProcessFeatures))
         settings = checked(ProcessSettings(**cast(Any, chosen)), "gp")
         return _fitted(store_of(pushes), settings, engine, out, progress)
     if features is not None:
         raise BadInput("`features` is of `gp`; give `recipe` those of a network.")
-    begun = recipe_for(start_named(_start_name(start))) if recipe is None else recipe
+    begun = _recipe(start, recipe)
     settings = begun.changed(**{k: v for k, v in given.items() if v is not None})
     total = settings.optimiser.iterations
     with _folder(out) as folder:
@@ -138,6 +140,23 @@ def tune(
             )
         found = load(folder)
     return found if out is not None else found.without_folder()
+
+
+def _recipe(start: Folder | Model, recipe: Recipe | None) -> Recipe:
+    """Return the recipe that fits a start, or the one that is given.
+
+    Raises:
+        BadInput: the recipe has another start than the one that is given.
+    """
+    wanted = start_named(_start_name(start))
+    if recipe is None:
+        return recipe_for(wanted)
+    if start != FROM_ENGINE and recipe.start != wanted:
+        raise BadInput(
+            f"`start` is {_start_name(start)}, and `recipe` has another start; leave "
+            "`start` out, or give `recipe_for` that start."
+        )
+    return recipe
 
 
 def _fitted(

@@ -53,7 +53,7 @@ def cross_validate(
     *,
     by: Scheme | Sequence[Scheme] = "chain",
     folds: int = 5,
-    models: Sequence[CandidateName] = USUAL_CANDIDATES,
+    models: CandidateName | Sequence[CandidateName] = USUAL_CANDIDATES,
     out: PathLike[str] | str | None = None,
     progress: bool | None = None,
 ) -> CrossValidation:
@@ -83,7 +83,8 @@ def cross_validate(
     schemes: Sequence[Scheme] = (by,) if isinstance(by, str) else tuple(by)
     for scheme in schemes:
         require_one_of("by", scheme, get_args(Scheme))
-    store, chosen = store_of(pushes), candidates_named(models)
+    names = (models,) if isinstance(models, str) else models
+    store, chosen = store_of(pushes), candidates_named(names)
     with ExitStack() as stack:
         folder = stack.enter_context(TemporaryDirectory()) if out is None else out
         advance = stack.enter_context(

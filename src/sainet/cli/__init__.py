@@ -1,10 +1,15 @@
 """The command line: thin subcommands, each of which calls one library function."""
 
+import io
 import signal
+import sys
 
 
 def main() -> None:
     """Run the command line; the console script `sainet`."""
+    # A terminal without a character of ours shows another one in its place.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
     from sainet.cli.entry import run
 
     status = run()

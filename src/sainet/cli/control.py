@@ -45,6 +45,7 @@ class Control:
 
     def run(self) -> Json:
         """Run the trials, or those of a shard, and print their outcome."""
+        self.config.check_used()
         use_cache()
         from sainet.control.trials import measure_trials, prepare
         from sainet.evaluation.trials import trial_rows

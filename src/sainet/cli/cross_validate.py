@@ -103,7 +103,7 @@ class CrossValidate:
         simulator = model.simulator
         data = f"--data {shlex.quote(str(self.data))}"
         if model.kind == "physics" and not (simulator and simulator.is_identified):
-            return [f"sainet evaluate --model physics {data}"]
+            return [f"sainet evaluate --model physics {_part(data, self.group, None)}"]
         if self.group or len(counts) == 1:
             return [_command(model, _part(data, self.group, self.pushes), "")]
         parts = {

@@ -20,7 +20,7 @@ from sainet.cli.evaluate import Evaluate
 from sainet.cli.help import message, option_registry
 from sainet.cli.identify import Identify
 from sainet.cli.inspect import Inspect
-from sainet.cli.output import finish
+from sainet.cli.output import drop_output, finish
 from sainet.cli.play import Play
 from sainet.cli.propose import Propose
 from sainet.cli.record import Record
@@ -28,6 +28,7 @@ from sainet.cli.report import MakeReport
 from sainet.cli.reproduce import Reproduce
 from sainet.cli.train import Train
 from sainet.cli.tune import Tune
+from sainet.runs.documents import is_full
 from sainet.runs.errors import BadInput, BadTable, SainetError
 from sainet.runs.interrupts import remembered_interrupts
 
@@ -111,10 +112,18 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         return 0
     except OSError as error:
-        if error.filename is None:
+        if error.filename is None and not is_full(error):
             raise
-        # For example a name that is too long, or a folder without permission.
-        reason = BadInput(f"{error.filename}: {error.strerror}; give another path.")
-        print(f"sainet: {message(reason)}", file=sys.stderr)
+        print(f"sainet: {message(_reason(error))}", file=sys.stderr)
+        if error.filename is None:
+            drop_output()
         return BadInput.exit_status
     return 0
+
+
+def _reason(error: OSError) -> BadInput:
+    """Return why a path or the output could not be used, in one line."""
+    if error.filename is None:
+        return BadInput("output: the disk is full; make room, or write to another.")
+    # For example a name that is too long, or a folder without permission.
+    return BadInput(f"{error.filename}: {error.strerror}; give another path.")

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import MISSING, Field, fields, is_dataclass
 from itertools import pairwise
 from textwrap import dedent
-from typing import Annotated, Any, Generic, get_args, get_type_hints
+from types import UnionType
+from typing import Annotated, Any, Generic, Union, get_args, get_origin, get_type_hints
 
 import tyro
 from tyro.conf import DisallowNone, Positional, arg
@@ -148,10 +149,22 @@ def _fields(settings: Any) -> Iterator[tuple[str, bool]]:  # noqa: ANN401
     own = []
     for field in fields(settings):
         hint = hints[field.name]
-        if is_dataclass(hint):
-            yield from _fields(hint)
-        else:
+        parts = [each for each in _alternatives(hint) if is_dataclass(each)]
+        for part in parts:
+            yield from _fields(part)
+        if not parts:
             own.append(
                 (field.name, _POSITIONAL not in getattr(hint, "__metadata__", ()))
             )
     yield from own
+
+
+def _alternatives(hint: Any) -> Iterator[Any]:  # noqa: ANN401
+    """Yield a type, or those of a union, without annotations."""
+    if get_origin(hint) is Annotated:
+        yield from _alternatives(get_args(hint)[0])
+    elif get_origin(hint) in (Union, UnionType):
+        for each in get_args(hint):
+            yield from _alternatives(each)
+    else:
+        yield hint

@@ -1,5 +1,6 @@
 """`sainet identify`."""
 
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -35,8 +36,6 @@ class Identify:
                 store, self.out, on_try=lambda error: advance(1, f"error {error:.3f}")
             )
         print_estimates(found, self.output.console)
-        self.output.say(
-            f"Compare: sainet evaluate --model physics-true {self.out} "
-            f"--data {self.data}"
-        )
+        places = shlex.join([str(self.out), "--data", str(self.data)])
+        self.output.say(f"Compare: sainet evaluate --model physics-true {places}")
         return {"out": str(self.out), **found.to_json()}

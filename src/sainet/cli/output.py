@@ -1,9 +1,10 @@
 """Output of commands: text, progress bars, or one JSON object at the end."""
 
 import json
+import os
 import sys
 from collections.abc import Mapping
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -56,7 +57,14 @@ def finish(result: Json, output: Output) -> None:
     """Print the result of a command as JSON if that was asked for."""
     if output.json:
         print(json.dumps(result, allow_nan=False))
-        sys.stdout.flush()
+    if sys.stdout is not None:  # pyright: ignore[reportUnnecessaryComparison]
+        sys.stdout.flush()  # here, where an error is reported
+
+
+def drop_output() -> None:
+    """Drop what standard output did not take; Python would try again at its end."""
+    with suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def progress_bar(

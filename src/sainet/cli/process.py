@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.learning.recipes import FROM_ENGINE
-from sainet.models.identity import Features
+from sainet.models.identity import Features, ProcessFeatures
 from sainet.runs.documents import checked
-from sainet.runs.errors import BadSetting
+from sainet.runs.errors import BadSetting, require_one_of
 
 if TYPE_CHECKING:
     from sainet.engines.simulator import InternalEngine
@@ -85,6 +85,8 @@ def _settings(changes: Given, usual: Given) -> "ProcessSettings":
     for name, value in changes.items():
         if name not in _OF_PROCESSES and value != {**usual, **_UNUSED}[name]:
             raise BadSetting(name, value, "left out: it is a setting of networks")
+    names = get_args(ProcessFeatures)
+    require_one_of("features", str(changes.get("features", names[0])), names)
     given = {name: changes[name] for name in _OF_PROCESSES & changes.keys()}
     return checked(ProcessSettings(**cast(Any, given)), "gp")
 
@@ -97,5 +99,5 @@ def for_networks(changes: Given) -> Given:
     """
     features = changes.get("features", "paper")
     if features not in get_args(Features):
-        raise BadSetting("features", features, "paper or place for a network")
+        raise BadSetting("features", features, "paper, place or contact for a network")
     return changes

@@ -22,6 +22,7 @@ class Record:
 
     def run(self) -> Json:
         """Record the pushes and import them."""
+        self.config.check_used()
         use_cache()
         from sainet.control.collect import DATASET, collect, rehearse, summary_of
 

@@ -1,5 +1,6 @@
 """`sainet reproduce`."""
 
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -138,12 +139,20 @@ class Reproduce:
         from sainet.studies.whole_report import whole_report
 
         steps = all_steps(lasts).values()
-        command = f"sainet reproduce --scale {self.scale} --out {self.out}"
         report = whole_report(
-            self.out, self.scale, not_run, steps, runner.clock, command=command
+            self.out, self.scale, not_run, steps, runner.clock, command=self._command
         )
         path = write_report(report, self.out / REPORT)
         self.output.say(f"All studies in {self.out} on one page: {path}")
+
+    @property
+    def _command(self) -> str:
+        """The command that makes the report of all studies."""
+        words = ["sainet", "reproduce", *self.studies, "--scale", self.scale]
+        given = {"out": self.out, "recorded": self.recorded}
+        for name, value in {**given, "trainings": self.trainings}.items():
+            words += [] if value is None else [f"--{name}", str(value)]
+        return shlex.join(words)
 
     @contextmanager
     def _runner(

@@ -119,6 +119,12 @@ class ControlConfig(RobotConfig):
         """The index of the target disk."""
         return (self.moved or self.disks - self.obstacles) - 1
 
+    def check_used(self) -> None:
+        """Raise `BadSetting` for a setting that differs and has no effect."""
+        super().check_used()
+        is_anywhere = not self.starts_in_a_row
+        self._check_used("area_mm", is_anywhere, "`robot` is lab or abb")
+
 
 _GAP_MM = (0.01, 100.0)
 
@@ -155,3 +161,9 @@ class CollectConfig(RobotConfig):
         if self.planner is not None:
             require_one_of("planner", self.planner, PLANNERS)
         require_one_of("goals", self.goals, get_args(Goals))
+
+    def check_used(self) -> None:
+        """Raise `BadSetting` for a setting that differs and has no effect."""
+        super().check_used()
+        for name in ("model", "goals"):
+            self._check_used(name, self.planner is not None, "`planner` is given")

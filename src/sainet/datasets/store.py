@@ -44,10 +44,11 @@ class Store:
         All pushes in their order give the same store with the same content hash.
 
         Raises:
-            BadInput: no push is chosen, or the store does not contain one of them.
+            BadInput: no push is chosen, the store does not contain one of them, or they
+                are no indices: a mask, for example.
         """
         every = range(self.info.pushes) if self.rows is None else self.rows
-        rows = [int(row) for row in rows]
+        rows = _indices(rows)
         if not rows:
             raise BadInput(f"{self.path}: no push was chosen; choose at least one.")
         if not 0 <= min(rows) <= max(rows) < self.info.pushes:
@@ -156,6 +157,21 @@ class Store:
             return whole
         chosen = len(self.rows) if self._is_prefix else self.rows
         return content_hash(f"{whole} {chosen}".encode())
+
+
+def _indices(rows: Iterable[int] | np.ndarray) -> list[int]:
+    """Return rows as whole numbers; a mask would otherwise choose pushes 0 and 1.
+
+    Raises:
+        BadInput: they are of another type, or have other axes.
+    """
+    found = np.asarray(rows if isinstance(rows, np.ndarray) else list(rows))
+    if found.size and (found.dtype.kind not in "iu" or found.ndim != 1):
+        raise BadInput(
+            f"`rows` is {shown(found)}; it must be whole numbers, the indices of "
+            "pushes (of a mask, use `np.flatnonzero`)."
+        )
+    return found.tolist()
 
 
 def _hash_pushes(

@@ -16,6 +16,7 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessCard
 from sainet.runs.errors import BadInput
+from sainet.scenes.quantities import MOST_STEPS, require_count
 
 PAPER_STEPS = 200
 
@@ -70,7 +71,8 @@ def steps_to_predict(store: Store, steps: int | None) -> int:
     if steps is None:
         recorded = store.info.is_recorded
         return store.info.steps if recorded else min(PAPER_STEPS, store.info.steps)
-    if not 0 <= steps <= store.info.steps:
+    require_count("steps", steps, low=0, high=MOST_STEPS)
+    if steps > store.info.steps:
         raise BadInput(
             f"`steps` is {steps}; {store.path} has {store.info.steps} (0 takes all)."
         )

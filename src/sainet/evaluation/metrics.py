@@ -16,6 +16,7 @@ from sainet.datasets.splits import last_known
 from sainet.evaluation.intervals import Folds, Interval, Sample
 from sainet.runs.errors import Diverged
 
+_AT_REST_MM = 1e-3  # mean travel below which a body is at rest
 REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
 
 Errors = dict[str, np.ndarray]  # each [..., push, body], by the names in `MEASURED`
@@ -68,9 +69,17 @@ class ModelErrors:
         return found if factor == 1.0 else _times(found, factor)
 
     def per_travel(self, name: str) -> Interval:
-        """Return the mean of an error over the mean travel (%), with its interval."""
+        """Return the mean of an error over the mean travel (%), with its interval.
+
+        Unknown (NaN) for a body at rest, and without an interval for one that moves in
+        so few pushes that a resample may lack them all.
+        """
         travel = Sample(self.travel_mm, self.folds)
-        return _times(self.samples[name].over(travel), 100)
+        value, *ends = _times(self.samples[name].over(travel), 100)
+        rests = travel.mean < _AT_REST_MM
+        may_rest = rests | (np.percentile(travel.drawn(), 2.5, axis=0) < _AT_REST_MM)
+        low, high = (np.where(may_rest, np.nan, end) for end in ends)
+        return np.where(rests, np.nan, value), low, high
 
 
 @dataclass(frozen=True)

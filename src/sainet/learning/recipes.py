@@ -6,12 +6,11 @@ Free of JAX.
 
 import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from typing import ClassVar, Literal
-
-import msgspec
+from typing import Any, ClassVar, Literal
 
 from sainet.models.card import TrainingSettings
 from sainet.models.identity import Features
+from sainet.runs.documents import checked
 from sainet.runs.errors import require, unknown_name
 
 Terms = Literal["motion", "error", "metres"]
@@ -22,7 +21,8 @@ def _require_at_least(part: object, least: int, *names: str) -> None:
     wanted = "at least 1" if least else "0 or more"
     for name in names:
         value = getattr(part, name)
-        require(math.isfinite(value) and value >= least, name, wanted, value)
+        is_known = isinstance(value, int | float) and math.isfinite(value)
+        require(is_known and value >= least, name, wanted, value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,10 +48,9 @@ class Optimiser:
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
         _require_at_least(self, 1, "iterations", "batch_size", "halve_every")
-        _require_at_least(self, 0, "average")
+        _require_at_least(self, 0, "average", "learning_rate", "clip_norm")
         for name in ("learning_rate", "clip_norm"):
-            value = getattr(self, name)
-            require(math.isfinite(value) and value > 0, name, "positive", value)
+            require(getattr(self, name) > 0, name, "positive", getattr(self, name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,10 +243,10 @@ class Recipe:
         Raises:
             BadInput: a setting has a wrong type.
         """
-        flat: dict[str, object] = {"horizon": self.horizon.kind}
+        flat: dict[str, Any] = {"horizon": self.horizon.kind}
         for name, value in asdict(replace(self, start=Fresh())).items():
             flat |= value if isinstance(value, dict) else {name: value}
-        return msgspec.convert(flat | {"horizon": self.horizon.kind}, TrainingSettings)
+        return checked(TrainingSettings(**flat), "recipe")
 
 
 PAPER = Recipe()

@@ -24,6 +24,7 @@ from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
 from sainet.scenes.controls import Controls
 from sainet.scenes.pushes import Push
+from sainet.scenes.quantities import MOST_STEPS, require_count
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
 
@@ -99,7 +100,10 @@ class Model:
             BadScene: a push is out of range, or the parts do not fit each other.
             BadCheckpoint: the network is for other pushes or another time step.
             BadInput: the model is not JAX, and the push is traced.
+            BadSetting: the number of steps is no whole number from 1.
         """
+        if steps is not None:
+            require_count("steps", steps, high=MOST_STEPS)
         if scene.body_count != state.body_count:
             raise BadScene(
                 f"state: it has {state.body_count} disks, the scene {scene.body_count}."

@@ -17,7 +17,7 @@ from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, Trajectory
 from sainet.worlds.setups import RobotSetup
 
-_USUAL_STEPS = 200  # of a push whose length or speed is traced
+_USUAL_STEPS = 200  # of pushes whose length or speed is traced, and of no push
 _PARAMETERS = {
     "contact_angle": CONTACT_ANGLE,
     "direction": DIRECTION,
@@ -37,7 +37,7 @@ def steps_of(push: Push, time_step: float) -> int:
         value = getattr(push, name)
         if not is_traced(value):
             quantity.check(value, f"push: {name}", error=BadScene)
-    if is_traced((push.length, push.speed)):
+    if is_traced((push.length, push.speed)) or not push.length.size:
         return _USUAL_STEPS
     # Single-precision numbers as they were meant: 0.05, not 0.0500000007.
     given = np.array([push.length, push.speed], np.float64)
@@ -52,11 +52,16 @@ def kind_of(push: Push | Controls) -> str:
 
 
 def check_axes(scene: Scene, state: State, push: Push) -> None:
-    """Raise `BadScene` unless the leading axes can be broadcast."""
+    """Raise `BadScene` unless scene, state and push have equal or no leading axes."""
+    names = ", ".join(map(str, _axes(scene, state, push)))
+    if max(map(len, _axes(scene, state, push))) > 1:
+        raise BadScene(
+            f"push: the leading axes of scene, state and push are {names}; give one "
+            "axis, push, or apply `jax.vmap` for each further one."
+        )
     try:
         np.broadcast_shapes(*_axes(scene, state, push))
     except ValueError:
-        names = ", ".join(map(str, _axes(scene, state, push)))
         raise BadScene(
             f"push: the leading axes of scene, state and push are {names}; give equal "
             "ones, or none."
@@ -79,7 +84,12 @@ def predict_push(
 
     parts = zip((scene, state, push), map(len, own), strict=True)
     scene, state, push = (widened(*part) for part in parts)
-    return predict(dynamics, scene, *command_path(scene, state, push, steps=steps))
+    initial, controls = command_path(scene, state, push, steps=steps)
+    if 0 in shape:  # networks reshape, which an axis of no pushes does not allow
+        return Trajectory(
+            jax.tree.map(lambda x: jnp.zeros((0, steps, *x.shape[1:])), initial)
+        )
+    return predict(dynamics, scene, initial, controls)
 
 
 compiled = eqx.filter_jit(predict_push)

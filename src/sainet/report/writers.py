@@ -228,10 +228,22 @@ def _latex_row(texts: Sequence[str]) -> str:
     return " & ".join(map(_tex, texts)) + r" \\"
 
 
+# The bracket would be read as an argument of the end of the row before.
+_TEX = {each: f"\\{each}" for each in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "[": "{[}",
+    "–": "--",  # noqa: RUF001
+}
+
+
 def _tex(text: str) -> str:
     """Return text in which nothing means anything to LaTeX."""
-    safe = text.replace("\\", r"\textbackslash ").replace("–", "--")  # noqa: RUF001
-    return re.sub(r"([&%$#_{}])", r"\\\1", safe)
+    return "".join(_TEX.get(character, character) for character in text)
 
 
 def to_csv(table: Table) -> str:

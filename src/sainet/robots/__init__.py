@@ -22,6 +22,13 @@ Surface = Literal["abs", "plywood"]
 _MOST_LABS = 1_000_000
 _PHYSICAL = "abb"
 _AREA_MM = (1.0, 10_000.0)
+# Settings that other robots do not have.
+_OF_ROBOTS = {
+    "world": "simulated",
+    "noise_level": "simulated",
+    "lab": "lab",
+    "surface": "lab",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +88,20 @@ class RobotConfig:
     def starts_in_a_row(self) -> bool:
         """Whether trials start with disks along the x axis, not anywhere."""
         return self.robot == "simulated"
+
+    def check_used(self) -> None:
+        """Raise `BadSetting` for a setting that differs and has no effect.
+
+        Programs that choose among robots may keep settings of all of them; whoever
+        gives one robot such a setting takes it for another.
+        """
+        for name, robot in _OF_ROBOTS.items():
+            self._check_used(name, self.robot == robot, f"`robot` is {robot}")
+
+    def _check_used(self, name: str, is_used: bool, where: str) -> None:  # noqa: FBT001
+        """Raise `BadSetting` unless a setting is used or as it is without use."""
+        value, usual = getattr(self, name), getattr(type(self), name)
+        require(is_used or value == usual, name, f"left out unless {where}", value)
 
     def settings(self) -> Mapping[str, object]:
         """Return every setting as a JSON value, for run folders."""

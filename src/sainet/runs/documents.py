@@ -53,11 +53,16 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 def write_error(path: Path, error: OSError) -> BadInput:
     """Return the error for a failed write, in one line."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+    if is_full(error):
         return BadInput(
             f"{path}: the disk is full; make room, then run the same command again."
         )
     return BadInput(f"{path}: cannot be written ({error.strerror}); choose another.")
+
+
+def is_full(error: OSError) -> bool:
+    """Return whether a write failed for want of room."""
+    return error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -141,9 +141,11 @@ LARGEST_COUNT = 2**63 - 1  # of a seed, in a document
 
 
 def require_count(
-    name: str, value: int, *, low: int = 1, high: int = LARGEST_COUNT
+    name: str, value: object, *, low: int = 1, high: int = LARGEST_COUNT
 ) -> None:
     """Raise `BadSetting` unless a setting is a whole number in a range."""
-    if not (isinstance(value, Integral) and low <= value <= high):
-        wanted = f"at least {low}" if value < low else f"from {low} to {high}"
+    if not isinstance(value, Integral):  # text and None cannot be compared
+        raise BadSetting(name, value, f"a whole number from {low} to {high}")
+    if not low <= int(value) <= high:
+        wanted = f"at least {low}" if int(value) < low else f"from {low} to {high}"
         raise BadSetting(name, value, wanted)

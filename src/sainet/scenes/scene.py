@@ -5,12 +5,14 @@ are optional; there is at least one disk.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
-from sainet.runs.errors import BadScene
+from sainet.runs.errors import BadScene, shown
 from sainet.scenes.quantities import PROPERTIES, TIME_STEP_RANGE
 from sainet.scenes.state import State, in_a_row
 
@@ -81,20 +83,27 @@ class Scene(eqx.Module):
         Raises:
             BadScene: a value is out of its range, or masses and radii differ in number.
         """
-        if len(mass) != len(radius):
+        disks = {"mass": mass, "radius": radius}
+        counts = [_count(*each) for each in disks.items()]
+        if counts[0] != counts[1]:
             raise BadScene(
-                f"scene: it has {len(mass)} masses and {len(radius)} radii; give one "
+                f"scene: it has {counts[0]} masses and {counts[1]} radii; give one "
                 "of each for every disk."
             )
-        scene = cls(
-            mass=jnp.asarray(mass, jnp.float32),
-            radius=jnp.asarray(radius, jnp.float32),
-            table_friction=jnp.float32(table_friction),
-            disk_friction=jnp.float32(disk_friction),
-            pusher_friction=jnp.float32(pusher_friction),
-            pusher_radius=jnp.float32(pusher_radius),
-            time_step=time_step,
-        )
+        single = {
+            "table_friction": table_friction,
+            "disk_friction": disk_friction,
+            "pusher_friction": pusher_friction,
+            "pusher_radius": pusher_radius,
+        }
+        for name, value in single.items():
+            if np.ndim(value):
+                raise BadScene(f"scene: {name} is {shown(value)}; give one number.")
+        given = {**disks, **single}
+        fields: dict[str, Any] = {
+            name: jnp.asarray(each, jnp.float32) for name, each in given.items()
+        }
+        scene = cls(**fields, time_step=time_step)
         check_scene(scene)
         return scene
 
@@ -114,6 +123,20 @@ class Scene(eqx.Module):
     def batch_shape(self) -> tuple[int, ...]:
         """The leading axes that all fields share."""
         return self.mass.shape[:-1]
+
+
+def _count(name: str, values: object) -> int:
+    """Return the number of disks that have a value.
+
+    Raises:
+        BadScene: none has, or the values are not one for each disk.
+    """
+    shape = np.shape(np.asarray(values))
+    if len(shape) != 1 or not shape[0]:
+        raise BadScene(
+            f"scene: {name} has the shape {list(shape)}; give one number for each disk."
+        )
+    return shape[0]
 
 
 _row = eqx.filter_jit(in_a_row)  # a dozen small operations in one

@@ -3,6 +3,8 @@
 Units are metres, radians, kilograms and seconds, in the table frame.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -86,6 +88,7 @@ def at_rest(
         angle: of the disks, rad.
         pusher_position: m.
     """
+    position, angle, pusher_position = map(_real, (position, angle, pusher_position))
     return State(
         position=position,
         angle=angle,
@@ -94,6 +97,12 @@ def at_rest(
         pusher_position=pusher_position,
         pusher_velocity=jnp.zeros_like(pusher_position),
     )
+
+
+def _real(values: Any) -> Any:  # noqa: ANN401 - NumPy's arrays, too
+    """Return whole numbers as real ones, which an engine can add to."""
+    is_whole = jnp.issubdtype(values.dtype, jnp.integer)
+    return jnp.asarray(values, jnp.float32) if is_whole else values
 
 
 def in_a_row(radius: Float[Array | np.ndarray, "*batch body"]) -> State:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 from sainet.control.config import ControlConfig, GivenProperties, Goals
 from sainet.control.worlds import TableConfig
 from sainet.robots import Surface
-from sainet.runs.errors import require_one_of
+from sainet.runs.errors import require, require_one_of
 
 if TYPE_CHECKING:
     from sainet.control.gym.actions import ActionKind
@@ -45,6 +45,11 @@ class PushDisksConfig(TableConfig):
         require_one_of("actions", self.actions, ("grid", "continuous"))
         require_one_of("reward", self.reward, get_args(RewardKind))
         self.control()
+        is_lab = self.world == "lab"
+        wanted = f"left out {'in' if is_lab else 'outside'} the world lab"
+        for name in ("noise_level",) if is_lab else ("lab", "surface"):
+            value, usual = getattr(self, name), getattr(type(self), name)
+            require(value == usual, name, wanted, value)
 
     def control(self, seed: int = 0) -> ControlConfig:
         """Return the settings of `sainet control` with the same trials."""

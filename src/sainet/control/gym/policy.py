@@ -44,7 +44,7 @@ class AbstractPolicy(ABC):
             Diverged: no candidate push has a finite prediction.
         """
         task, state = self.task, self.task.state(observation)
-        goal = task.towards(observation["desired_goal"])
+        goal = task.towards(task.goal(observation))
         return self.planner.plan(self.model.dynamics, goal, task.scene, state)
 
     def act(self, observation: Observation) -> Action:

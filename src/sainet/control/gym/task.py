@@ -63,6 +63,14 @@ class PushDisksTask:
             self.config.alignment,
         )
 
+    def goal(self, observation: Observation) -> Float[np.ndarray, "2"]:
+        """Return the goal of an observation (m).
+
+        Raises:
+            BadInput: the observation is not one of the environment.
+        """
+        return _part(observation, "desired_goal", (2,))
+
     def state(self, observation: Observation) -> State:
         """Return the observed poses as a state at rest; the pusher is not placed.
 
@@ -70,17 +78,23 @@ class PushDisksTask:
             BadInput: the observation is not one of the environment.
         """
         wanted = (3 * self.scene.body_count,)
-        try:
-            pose = np.asarray(observation["observation"], np.float32)
-        except (KeyError, TypeError, ValueError, IndexError):
-            pose = np.empty(0, np.float32)
-        if pose.shape != wanted:
-            raise BadInput(
-                "observation: it has no poses of shape "
-                f"{wanted} under 'observation'; give what `reset` or `step` returned."
-            )
-        pose = jnp.asarray(pose.reshape(-1, 3))
+        pose = jnp.asarray(_part(observation, "observation", wanted).reshape(-1, 3))
         return at_rest(pose[:, :2], pose[:, 2], jnp.zeros(2, jnp.float32))
+
+
+def _part(
+    observation: Observation, name: str, wanted: tuple[int, ...]
+) -> Float[np.ndarray, " number"]:
+    try:
+        found = np.asarray(observation[name], np.float32)
+    except (KeyError, TypeError, ValueError, IndexError):
+        found = np.empty(0, np.float32)
+    if found.shape != wanted:
+        raise BadInput(
+            f"observation: it has no numbers of shape {wanted} under '{name}'; give "
+            "what `reset` or `step` returned."
+        )
+    return found
 
 
 def observation_of(

@@ -77,7 +77,7 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
     def reset(
         self,
         *,
-        seed: int | Sequence[int] | None = None,
+        seed: int | np.integer | Sequence[int] | None = None,
         options: Mapping[str, object] | None = None,
     ) -> tuple[Observation, _Infos]:
         """Begin a trial in every environment.
@@ -167,13 +167,15 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
         }
 
 
-def _seeds(seed: int | Sequence[int], count: int) -> np.ndarray:
+def _seeds(seed: int | np.integer | Sequence[int], count: int) -> np.ndarray:
     """Return one seed for each environment.
 
     Raises:
         BadInput: their number is another one, or a seed is no whole number from 0.
     """
-    each = list(range(seed, seed + count)) if isinstance(seed, int) else list(seed)
+    if isinstance(seed, int | np.integer):
+        seed = range(int(seed), int(seed) + count)
+    each = list(seed)
     if len(each) != count:
         raise BadInput(f"seed: {len(each)} seeds; give {count}, or one number.")
     for one in each:
