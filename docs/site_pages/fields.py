@@ -12,9 +12,13 @@ _COMMENT = re.compile(r"#\s*(.+?)\s*$")
 
 
 def add_fields(app: Sphinx, what: str, _name: str, item: object, *rest: object) -> None:
-    """Append a list of the fields to the docstring of a class, the last argument."""
+    """Append a list of the fields to the docstring of a class, the last argument.
+
+    Docstrings with a section of attributes have one already.
+    """
     lines = cast(list[str], rest[-1])
-    if what == "class" and isinstance(item, type):
+    is_listed = "Attributes:" in (getattr(item, "__doc__", None) or "")
+    if what == "class" and isinstance(item, type) and not is_listed:
         found = list(_fields(item))
         if found:
             lines += ["", "**Fields**", "", *found, ""]

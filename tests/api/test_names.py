@@ -1,10 +1,14 @@
 """Every public name is found, documented and completed."""
 
 import inspect
+from dataclasses import fields
 
+import equinox as eqx
 import pytest
 
 import sainet as sn
+from sainet.planning.base import Plan
+from sainet.tasks.push_to_goal import PushToGoal
 
 
 def test_editors_complete_the_public_names():
@@ -23,3 +27,25 @@ def test_a_public_name_is_documented(name):
 def test_a_model_says_what_it_is():
     assert repr(sn.load("sain")) == "<Model sain: SAIN>"
     assert repr(sn.load("physics").called("Physics")) == "<Model Physics>"
+
+
+def shown_types() -> list[type]:
+    """Public classes with fields whose shapes and units readers need."""
+    found = [getattr(sn, name) for name in sn.__all__]
+    modules = [each for each in found if inspect.isclass(each)]
+    return [each for each in modules if issubclass(each, eqx.Module)]
+
+
+@pytest.mark.parametrize("kind", [*shown_types(), sn.Model, Plan, PushToGoal])
+def test_editors_show_every_field(kind):
+    """In the docstring: comments in the source are shown by no editor."""
+    _, _, attributes = (inspect.getdoc(kind) or "").partition("\nAttributes:\n")
+    names = [each.name for each in fields(kind) if not each.name.startswith("_")]
+    missing = [name for name in names if f"    {name}: " not in attributes]
+    assert not missing
+
+
+@pytest.mark.parametrize("kind", [sn.State, sn.Scene, sn.Push, sn.PathControls])
+def test_docstrings_state_shapes_and_units(kind):
+    shown = inspect.getdoc(kind) or ""
+    assert "(m)" in shown and "[" in shown

@@ -174,3 +174,26 @@ def test_a_model_outside_jax_refuses_to_be_traced():
     own = sn.from_function(rest, name="rest")
     with pytest.raises(BadInput, match="rest does not run in JAX"):
         jax.vmap(lambda a: own.predict(SCENE, SCENE.in_a_row(), sn.Push(a)))(ANGLES)
+
+
+@pytest.mark.parametrize(
+    ("mass", "radius", "disks"),
+    [(0.9, 0.054, 1), (0.9, [0.054, 0.06], 2), ([0.9, 1.0, 1], np.float32(0.05), 3)],
+)
+def test_one_number_is_that_of_all_disks(mass, radius, disks):
+    scene = sn.Scene.disks(mass=mass, radius=radius)
+    assert scene.mass.shape == scene.radius.shape == (disks,)
+    np.testing.assert_allclose(scene.mass, np.broadcast_to(mass, disks), rtol=1e-6)
+    np.testing.assert_allclose(scene.radius, np.broadcast_to(radius, disks), rtol=1e-6)
+    assert scene.in_a_row().position.shape == (disks, 2)
+
+
+def test_a_state_is_made_of_lists():
+    lists = [[0, 0], [0.12, 0]], [0, 1], [-0.06, 0]
+    state = sn.at_rest(*lists)
+    wanted = sn.at_rest(*(jnp.asarray(each, jnp.float32) for each in lists))
+    for found, same in zip(jax.tree.leaves(state), jax.tree.leaves(wanted), strict=True):
+        assert found.dtype == jnp.float32
+        np.testing.assert_array_equal(found, same)
+    moved = sn.load("physics").predict(SCENE, state, sn.Push(0.0), steps=20).final
+    assert moved.position[0, 0] > 0.001

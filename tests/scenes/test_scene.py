@@ -125,7 +125,6 @@ def test_whole_numbers_become_real_ones():
     [
         ({"mass": [], "radius": []}, r"mass has the shape \[0\]"),
         ({"mass": [[1.0, 1.0]]}, r"mass has the shape \[1, 2\]"),
-        ({"radius": np.float32(0.05)}, r"radius has the shape \[\]"),
         (
             {"table_friction": np.array([0.1, 0.2])},
             r"table_friction is \[0.1 0.2\]; give one",

@@ -35,9 +35,12 @@ class ErrorTable:
     """Errors of several models on the same pushes, with 95 % intervals.
 
     `print` shows it, a notebook draws it.
+
+    Attributes:
+        measured: every error of every push (mm, degrees).
     """
 
-    measured: Measurements  # every error of every push
+    measured: Measurements
 
     @cached_property
     def summary(self) -> Summary:

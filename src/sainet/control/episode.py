@@ -31,22 +31,36 @@ _TOLERANCES = (
 
 @dataclass(frozen=True)
 class ControlStep:
-    """One decision and its push."""
+    """One decision and its push.
+
+    Attributes:
+        observed: measured poses before the push.
+        plan: the decision.
+        recording: of the push.
+        seconds: that the decision took.
+        scene: properties that it was made with.
+    """
 
     observed: State
     plan: Plan
     recording: Recording
-    seconds: float  # of the decision
-    scene: Scene  # properties that it was made with
+    seconds: float
+    scene: Scene
 
 
 @dataclass
 class Episode:
-    """An episode: its control steps, the last observation and the reason of its end."""
+    """An episode of control.
+
+    Attributes:
+        steps: decisions and pushes, in order.
+        final: the last observation.
+        reason: why the episode ended: `solved`, `out of pushes`, or a failure.
+    """
 
     steps: list[ControlStep] = field(default_factory=list)
-    final: State | None = None  # last observation
-    reason: str = "interrupted"  # why the episode ended
+    final: State | None = None
+    reason: str = "interrupted"
 
 
 def run_episode(

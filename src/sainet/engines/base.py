@@ -57,6 +57,10 @@ class AssumedProperties(AbstractEngine):
     Disks are not re-seated: where an assumed radius differs from the true one, they
     overlap or leave a gap at the start, and the engine has to deal with it. A friction
     field is never assumed.
+
+    Attributes:
+        engine: the wrapped engine.
+        assumptions: masses (kg), radii (m) and frictions; None keeps those of a scene.
     """
 
     engine: AbstractEngine

@@ -31,15 +31,25 @@ from sainet.scenes.state import State, Trajectory
 
 @dataclass(frozen=True)
 class Model:
-    """A dynamics model, its identity, and the card of its network if it has one."""
+    """A dynamics model, its identity, and the card of its network if it has one.
+
+    Attributes:
+        id: what it is, from which its name follows.
+        dynamics: predicts; planners take it as well as the model.
+        card: of its network.
+        folder: of a trained network or of identified parameters.
+        digest: hash of the weights or of the identified parameters.
+        internal: engine that predicts s-bar for the dynamics.
+        identified: estimates of identified physics.
+    """
 
     id: ModelId
     dynamics: AbstractDynamics
     card: Card | ProcessCard | None = None
-    folder: Path | None = None  # of a trained network or identified parameters
-    digest: str | None = None  # hash of the weights or the identified parameters
-    internal: InternalEngine | None = None  # that predicts s-bar for the dynamics
-    identified: Identified | None = None  # estimates of identified physics
+    folder: Path | None = None
+    digest: str | None = None
+    internal: InternalEngine | None = None
+    identified: Identified | None = None
 
     def __repr__(self) -> str:
         """Return name and kind in one line."""

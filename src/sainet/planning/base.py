@@ -23,19 +23,29 @@ from sainet.tasks.push_to_goal import AbstractTask
 
 @dataclass(frozen=True)
 class Plan:
-    """The pushes selected by a planner, in order of execution."""
+    """The pushes selected by a planner, in order of execution.
+
+    Attributes:
+        pushes: single pushes.
+        predict: returns `path`.
+        cost: at the end of the path.
+        distance: of the target disk from the goal at the end of the path (m).
+        looked_at: number of predicted pushes.
+        is_complete: False: a deadline or limit ended the search early.
+        warnings: why the prediction may be inaccurate.
+    """
 
     pushes: tuple[Push, ...]
     predict: Callable[[], Float[np.ndarray, "time body 3"]] = field(repr=False)
-    cost: float  # at the end of the path
-    distance: float  # at the end of the path, m
-    looked_at: int  # number of predicted pushes
-    is_complete: bool = True  # False: a deadline or limit ended the search early
-    warnings: tuple[str, ...] = ()  # why the prediction may be inaccurate
+    cost: float
+    distance: float
+    looked_at: int
+    is_complete: bool = True
+    warnings: tuple[str, ...] = ()
 
     @cached_property
     def path(self) -> Float[np.ndarray, "time body 3"]:
-        """The predicted poses over all pushes, computed when first read."""
+        """The predicted poses over all pushes (m, m, rad), computed when first read."""
         return self.predict()
 
 

@@ -123,10 +123,16 @@ class Controls(eqx.Module):
 
 
 class PathControls(Controls):
-    """The pusher follows a path (the robot setup)."""
+    """The pusher follows a path (the robot setup).
 
-    position: Vectors  # m, commanded at the end of each step
-    velocity: Vectors  # m/s, commanded during each step
+    Attributes:
+        position: commanded at the end of each step, [time, 2] (m); of a batch
+            [push, time, 2].
+        velocity: commanded during each step, [time, 2] (m/s).
+    """
+
+    position: Vectors
+    velocity: Vectors
 
     kind: ClassVar[str] = "robot"
 
@@ -184,12 +190,19 @@ class PathControls(Controls):
 
 
 class ForceControls(Controls):
-    """A force drives the pusher against a viscous damper (the direct-force setup)."""
+    """A force drives the pusher against a viscous damper (the direct-force setup).
 
-    force: Vectors  # N
-    contact_offset: Vector  # m, pusher minus disk at the start
-    pusher_mass: float = eqx.field(static=True, default=10.0)  # kg
-    damping: float = eqx.field(static=True, default=1000.0)  # N s/m
+    Attributes:
+        force: during each step, [time, 2] (N); of a batch [push, time, 2].
+        contact_offset: pusher minus disk 1 at the start, [2] (m).
+        pusher_mass: kg.
+        damping: N s/m.
+    """
+
+    force: Vectors
+    contact_offset: Vector
+    pusher_mass: float = eqx.field(static=True, default=10.0)
+    damping: float = eqx.field(static=True, default=1000.0)
 
     kind: ClassVar[str] = "direct-force"
 

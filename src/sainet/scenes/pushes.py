@@ -18,12 +18,19 @@ class Push(eqx.Module):
 
     The contact angle is about the axis from disk 1 to disk 2 (one disk: the table's
     x axis), measured from the back of disk 1; the direction is from the normal.
+
+    Attributes:
+        contact_angle: where the pusher touches disk 1 (rad); a scalar, of a batch
+            [push], as all others.
+        direction: of the pusher's motion, from the contact normal (rad).
+        length: of the stroke (m).
+        speed: of the pusher (m/s).
     """
 
-    contact_angle: Float[Array, "*batch"]  # rad
-    direction: Float[Array, "*batch"]  # rad
-    length: Float[Array, "*batch"]  # m
-    speed: Float[Array, "*batch"]  # m/s
+    contact_angle: Float[Array, "*batch"]
+    direction: Float[Array, "*batch"]
+    length: Float[Array, "*batch"]
+    speed: Float[Array, "*batch"]
 
     def __init__(
         self,
@@ -50,14 +57,23 @@ class Push(eqx.Module):
 
 
 class PushGrid(eqx.Module):
-    """The paper's 12 by 6 pushes: midpoints of the bins of both angles."""
+    """The paper's 12 by 6 pushes: midpoints of the bins of both angles.
+
+    Attributes:
+        contact_bins: number of contact angles.
+        direction_bins: number of push directions.
+        contact_range: of contact angles, to either side (rad).
+        direction_range: of push directions, to either side (rad).
+        length: of each push (m).
+        speed: of each push (m/s).
+    """
 
     contact_bins: int = 12
     direction_bins: int = 6
-    contact_range: float = np.pi / 3  # rad, to either side
-    direction_range: float = np.pi / 6  # rad, to either side
-    length: float = 0.010  # m
-    speed: float = 0.050  # m/s
+    contact_range: float = np.pi / 3
+    direction_range: float = np.pi / 6
+    length: float = 0.010
+    speed: float = 0.050
 
     def pushes(self) -> Push:
         """Return all pushes as one batch, the directions running fastest."""

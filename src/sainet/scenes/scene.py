@@ -4,7 +4,6 @@ Units are metres, radians, kilograms and seconds, in the table frame. Leading ba
 are optional; there is at least one disk.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -14,7 +13,7 @@ from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene, shown
 from sainet.scenes.quantities import PROPERTIES, TIME_STEP_RANGE
-from sainet.scenes.state import State, in_a_row
+from sainet.scenes.state import Numbers, State, in_a_row
 
 GRAVITY = 9.81  # m/s^2
 TIME_STEP = 1 / 240  # s, the paper's
@@ -26,10 +25,15 @@ class FrictionField(eqx.Module):
     Its value is ``1 + amplitude * sum(cos(wave . p + phase))``, a sum of random
     Fourier features. With waves from a normal distribution of standard deviation
     1 / length, its correlation is a Gaussian of that length.
+
+    Attributes:
+        wave: [feature, 2] (rad/m).
+        phase: [feature] (rad).
+        amplitude: a scalar without a unit.
     """
 
-    wave: Float[Array, "*batch feature 2"]  # rad/m
-    phase: Float[Array, "*batch feature"]  # rad
+    wave: Float[Array, "*batch feature 2"]
+    phase: Float[Array, "*batch feature"]
     amplitude: Float[Array, "*batch"]
 
     def at(
@@ -46,22 +50,35 @@ class FrictionField(eqx.Module):
 
 
 class Scene(eqx.Module):
-    """Static properties of disks on a table and of the pusher."""
+    """Static properties of disks on a table and of the pusher.
 
-    mass: Float[Array, "*batch body"]  # kg
-    radius: Float[Array, "*batch body"]  # m
-    table_friction: Float[Array, "*batch"]  # between a disk and the table
-    disk_friction: Float[Array, "*batch"]  # between two disks
-    pusher_friction: Float[Array, "*batch"]  # between the pusher and a disk
-    pusher_radius: Float[Array, "*batch"]  # m
+    Batches of scenes have a leading axis, push, in every array.
+
+    Attributes:
+        mass: of each disk, [body] (kg).
+        radius: of each disk, [body] (m).
+        table_friction: between a disk and the table; a scalar, as all further ones.
+        disk_friction: between two disks.
+        pusher_friction: between the pusher and a disk.
+        pusher_radius: m.
+        friction_field: multiplies table friction from place to place; None: even.
+        time_step: s, one number for a batch.
+    """
+
+    mass: Float[Array, "*batch body"]
+    radius: Float[Array, "*batch body"]
+    table_friction: Float[Array, "*batch"]
+    disk_friction: Float[Array, "*batch"]
+    pusher_friction: Float[Array, "*batch"]
+    pusher_radius: Float[Array, "*batch"]
     friction_field: FrictionField | None = None
-    time_step: float = eqx.field(static=True, default=TIME_STEP)  # s
+    time_step: float = eqx.field(static=True, default=TIME_STEP)
 
     @classmethod
     def disks(
         cls,
-        mass: Sequence[float],
-        radius: Sequence[float],
+        mass: Numbers,
+        radius: Numbers,
         *,
         table_friction: float = 0.15,
         disk_friction: float = 0.25,
@@ -72,8 +89,9 @@ class Scene(eqx.Module):
         """Return one scene from plain numbers.
 
         Args:
-            mass: of each disk, kg.
-            radius: of each disk, m.
+            mass: of each disk, kg. One number is that of all disks, of which there is
+                one if `radius` is a number, too.
+            radius: of each disk, m; or one number.
             table_friction: between a disk and the table.
             disk_friction: between two disks.
             pusher_friction: between the pusher and a disk.
@@ -85,7 +103,8 @@ class Scene(eqx.Module):
         """
         disks = {"mass": mass, "radius": radius}
         counts = [_count(*each) for each in disks.items()]
-        if counts[0] != counts[1]:
+        count = max(*counts, 1)
+        if not {*counts} <= {0, count}:
             raise BadScene(
                 f"scene: it has {counts[0]} masses and {counts[1]} radii; give one "
                 "of each for every disk."
@@ -99,9 +118,10 @@ class Scene(eqx.Module):
         for name, value in single.items():
             if np.ndim(value):
                 raise BadScene(f"scene: {name} is {shown(value)}; give one number.")
-        given = {**disks, **single}
+        shapes = {**dict.fromkeys(disks, (count,)), **dict.fromkeys(single, ())}
         fields: dict[str, Any] = {
-            name: jnp.asarray(each, jnp.float32) for name, each in given.items()
+            name: jnp.broadcast_to(jnp.asarray(each, jnp.float32), shapes[name])
+            for name, each in (disks | single).items()
         }
         scene = cls(**fields, time_step=time_step)
         check_scene(scene)
@@ -126,17 +146,18 @@ class Scene(eqx.Module):
 
 
 def _count(name: str, values: object) -> int:
-    """Return the number of disks that have a value.
+    """Return the number of disks that have a value, 0 for one number for all.
 
     Raises:
-        BadScene: none has, or the values are not one for each disk.
+        BadScene: no disk has one, or the values are not one for each disk.
     """
     shape = np.shape(np.asarray(values))
-    if len(shape) != 1 or not shape[0]:
+    if len(shape) > 1 or 0 in shape:
         raise BadScene(
-            f"scene: {name} has the shape {list(shape)}; give one number for each disk."
+            f"scene: {name} has the shape {list(shape)}; give one number for each "
+            "disk, or one for all."
         )
-    return shape[0]
+    return shape[0] if shape else 0
 
 
 _row = eqx.filter_jit(in_a_row)  # a dozen small operations in one

@@ -3,25 +3,40 @@
 Units are metres, radians, kilograms and seconds, in the table frame.
 """
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, cast
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
 
+Numbers = ArrayLike | Sequence[Any]  # an array, or lists of numbers
+
 
 class State(eqx.Module):
-    """Poses and velocities of the disks and the pusher, in the table frame."""
+    """Poses and velocities of the disks and the pusher, in the table frame.
 
-    position: Float[Array, "*batch body 2"]  # m
-    angle: Float[Array, "*batch body"]  # rad, counter-clockwise, never wrapped
-    velocity: Float[Array, "*batch body 2"]  # m/s
-    spin: Float[Array, "*batch body"]  # rad/s
-    pusher_position: Float[Array, "*batch 2"]  # m
-    pusher_velocity: Float[Array, "*batch 2"]  # m/s
+    Batches of states have leading axes, push and time for example, in every field.
+
+    Attributes:
+        position: of the disks, [body, 2] (m).
+        angle: of the disks, [body] (rad), counter-clockwise, never wrapped.
+        velocity: of the disks, [body, 2] (m/s).
+        spin: of the disks, [body] (rad/s).
+        pusher_position: [2] (m).
+        pusher_velocity: [2] (m/s).
+    """
+
+    position: Float[Array, "*batch body 2"]
+    angle: Float[Array, "*batch body"]
+    velocity: Float[Array, "*batch body 2"]
+    spin: Float[Array, "*batch body"]
+    pusher_position: Float[Array, "*batch 2"]
+    pusher_velocity: Float[Array, "*batch 2"]
 
     @property
     def body_count(self) -> int:
@@ -53,8 +68,13 @@ class State(eqx.Module):
 class Trajectory(eqx.Module):
     """States after each step, without the initial state.
 
-    Every field of `states` has a time axis directly after the batch axes. In every
-    engine and model ``p(t+1) = p(t) + dt * v(t+1)``, also during recovery of overlaps.
+    In every engine and model ``p(t+1) = p(t) + dt * v(t+1)``, also during recovery of
+    overlaps.
+
+    Attributes:
+        states: after each step; every field has an axis, time, directly after those of
+            the batch: positions are [time, body, 2] (m), angles [time, body] (rad), of
+            a batch [push, time, body, 2] and [push, time, body].
     """
 
     states: State
@@ -76,19 +96,16 @@ def _at_step(states: State, step: int) -> State:
     )
 
 
-def at_rest(
-    position: Float[Array, "*batch body 2"],
-    angle: Float[Array, "*batch body"],
-    pusher_position: Float[Array, "*batch 2"],
-) -> State:
+def at_rest(position: Numbers, angle: Numbers, pusher_position: Numbers) -> State:
     """Return the state at rest with the given poses.
 
     Args:
-        position: of the disks, m.
-        angle: of the disks, rad.
-        pusher_position: m.
+        position: of the disks, [body, 2] (m); lists or arrays, also with leading axes.
+        angle: of the disks, [body] (rad).
+        pusher_position: [2] (m).
     """
-    position, angle, pusher_position = map(_real, (position, angle, pusher_position))
+    given = position, angle, pusher_position
+    position, angle, pusher_position = map(_floats, given)
     return State(
         position=position,
         angle=angle,
@@ -99,10 +116,9 @@ def at_rest(
     )
 
 
-def _real(values: Any) -> Any:  # noqa: ANN401 - NumPy's arrays, too
-    """Return whole numbers as real ones, which an engine can add to."""
-    is_whole = jnp.issubdtype(values.dtype, jnp.integer)
-    return jnp.asarray(values, jnp.float32) if is_whole else values
+def _floats(numbers: Numbers) -> Array:
+    kind = np.dtype(getattr(numbers, "dtype", int)).kind
+    return cast(Array, numbers if kind == "f" else jnp.asarray(numbers, float))
 
 
 def in_a_row(radius: Float[Array | np.ndarray, "*batch body"]) -> State:

@@ -49,13 +49,18 @@ class PushToGoal(AbstractTask):
     before it. To turn the target disk towards the goal, the disk behind it has to move
     the other way: its wanted direction is mirrored at the line of the two, and so on to
     disk 1. Rows buckle easily, so that w is three times as large.
+
+    Attributes:
+        goal: of the target disk, [2] (m).
+        moved: index of the target disk, from 0.
+        tolerance: fraction of the radius of the target disk.
+        alignment: w (m).
     """
 
-    goal: Float[Array, " 2"]  # m
-    moved: int = eqx.field(static=True, default=1)  # index of the target disk
-    # Fraction of the radius of the target disk.
+    goal: Float[Array, " 2"]
+    moved: int = eqx.field(static=True, default=1)
     tolerance: float = eqx.field(static=True, default=TOLERANCE_RADII)
-    alignment: float = eqx.field(static=True, default=ALIGNMENT)  # w, m
+    alignment: float = eqx.field(static=True, default=ALIGNMENT)
 
     def distance(self, state: State) -> Float[Array, "*batch"]:
         """Return the distance of the target disk from the goal (m).

@@ -19,13 +19,17 @@ class PlanarEngine(AbstractEngine):
     without restitution between all pairs, and the ellipsoidal limit surface of each
     pressed disk; then ``p(t+1) = p(t) + dt * v(t+1)``. The engine computes in the
     precision of its inputs and is stateless.
+
+    Attributes:
+        pressure_radius_ratio: mean distance of the pressure from the centre over the
+            radius: 2/3 when it is uniform, 1 when the disk rests on its rim.
+        sweeps: of the solver over all contacts, in each step.
+        recovery: fraction of an overlap that each step removes.
     """
 
-    # Mean distance of the pressure from the centre over the radius: 2/3 when it is
-    # uniform, 1 when the disk rests on its rim.
     pressure_radius_ratio: float | Float[Array, ""] = 2 / 3
     sweeps: int = eqx.field(static=True, default=10)
-    recovery: float = eqx.field(static=True, default=0.08)  # overlap fraction per step
+    recovery: float = eqx.field(static=True, default=0.08)
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls."""

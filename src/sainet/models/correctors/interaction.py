@@ -28,13 +28,22 @@ REACH = 0.02  # m, see `_effects`
 
 
 class InteractionNetwork(AbstractNetwork):
-    """Predicts the next motion of any number of bodies."""
+    """Predicts the next motion of any number of bodies.
 
-    rel: Layers  # f_rel
-    dyn: Layers  # f_dyn, which ends in a linear read-out of the accelerations
+    Attributes:
+        rel: f_rel, of the inputs of pairs of bodies.
+        dyn: f_dyn, which ends in a linear read-out of the accelerations.
+        scales: of inputs and accelerations.
+        features: the inputs.
+        time_step: of the pushes that it is for (s).
+        integrator: of the accelerations.
+    """
+
+    rel: Layers
+    dyn: Layers
     scales: Scales
     features: FeatureSet = eqx.field(static=True)
-    time_step: float = eqx.field(static=True)  # s
+    time_step: float = eqx.field(static=True)
     integrator: integrators.Integrator = eqx.field(static=True)
 
     def __init__(
