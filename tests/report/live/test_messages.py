@@ -30,8 +30,7 @@ HOSTILE = {
     "infinity": json.dumps({**DISK, "x_mm": float("inf")}),
     "huge": '{"type": "disk", "disk": 1, "x_mm": 1e999, "y_mm": 0}',
     "far away": json.dumps({**DISK, "x_mm": 1e6}),
-    "disk 0": json.dumps({**DISK, "disk": 0}),
-    "disk 99": json.dumps({**DISK, "disk": 99}),
+    "disk -1": json.dumps({**DISK, "disk": -1}),
     "half a disk": json.dumps({**DISK, "disk": 1.5}),
     "deep": "[" * 4000,
     "no UTF-8": b'{"type": "push\xff"}',
@@ -64,6 +63,34 @@ def test_hostile_messages_are_refused_in_one_printable_line(text):
         read_message(text)
     assert str(refused.value).isprintable()
     assert len(str(refused.value)) < 250
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"disk": "one"}, "disk must be a whole number"),
+        ({"x_mm": 1e6}, "x_mm must be at most 10000"),
+        ({"y_mm": None}, "y_mm must be a number"),
+        ({"z_mm": 1}, "z_mm is no field of such messages"),
+        ({"type": "disc"}, "there is no type 'disc'"),
+    ],
+)
+def test_a_message_is_refused_in_words(change, words):
+    with pytest.raises(BadMessage) as refused:
+        read_message(json.dumps(DISK | change))
+    assert str(refused.value).startswith(f"Message refused: {words}")
+    assert not {"`", "$"} & set(str(refused.value))
+
+
+def test_a_message_without_a_field_or_of_another_kind_is_refused_in_words():
+    for text, words in (
+        ('{"type": "disk"}', "disk is missing"),
+        ("[1]", "a message must be a JSON object"),
+        (HOSTILE["many masses"], "mass_kg must have at most 4 numbers"),
+        (HOSTILE["unknown world"], "there is no world 'mars'"),
+    ):
+        with pytest.raises(BadMessage, match=f"^Message refused: {words}"):
+            read_message(text)
 
 
 def test_messages_are_read():

@@ -101,7 +101,8 @@ def test_predictions_differ_from_the_first_model(session):
 
 REFUSED = {
     "overlap": (MoveDisk(2, 30.0, 0.0), "overlap disk 1 by"),
-    "no such disk": (MoveDisk(3, 0.0, 0.0), "no disk 3"),
+    "no such disk": (MoveDisk(3, 0.0, 0.0), "no disk 3; there are disks 1 to 2"),
+    "disk 0": (MoveDisk(0, 0.0, 0.0), "no disk 0; there are disks 1 to 2"),
     "disk off the table": (MoveDisk(1, 900.0, 0.0), "off the table"),
     "goal off the table": (MoveGoal(0.0, -600.0), "off the table"),
     "unknown model": (ChooseModel("../secret"), "choose physics, physics-true"),

@@ -1,5 +1,6 @@
 """Messages from the page, checked when they are read. Free of JAX."""
 
+import re
 from typing import Annotated, ClassVar
 
 import msgspec
@@ -11,12 +12,22 @@ from sainet.worlds.noise import NoiseLevel
 
 LARGEST_MESSAGE = 4096  # bytes
 _LONGEST_REASON = 160  # characters
+# Errors of msgspec, in words.
+_WORDS = {
+    "Object missing required field `(.+)`": "{value} is missing",
+    "Object contains unknown field `(.+)`": "{value} is no field of such messages",
+    "Invalid (?:enum )?value (.+)": "there is no {field} {value}",
+    r"Expected `\w+` >= (.+)": "{field} must be at least {value}",
+    r"Expected `\w+` <= (.+)": "{field} must be at most {value}",
+    "Expected `array` of length <= (.+)": "{field} must have at most {value} numbers",
+    r"Expected `(\w+)`, got .+": "{field} must be {value}",
+}
+_KINDS = {"int": "a whole number", "float": "a number", "object": "a JSON object"}
 
 Millimetres = Annotated[float, msgspec.Meta(ge=-10_000, le=10_000)]
 Angle = Annotated[float, msgspec.Meta(ge=-180, le=180)]
 Direction = Annotated[float, msgspec.Meta(ge=-60, le=60)]
 Number = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
-DiskNumber = Annotated[int, msgspec.Meta(ge=1, le=DISK_COUNTS[-1])]
 DiskCount = Annotated[int, msgspec.Meta(ge=DISK_COUNTS[0], le=DISK_COUNTS[-1])]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 # Of a world that people can play with; other parts of sainet accept more.
@@ -53,7 +64,7 @@ class Aim(_Message, frozen=True, tag="aim"):
 class MoveDisk(_Message, frozen=True, tag="disk"):
     """Put a disk on a place."""
 
-    disk: DiskNumber
+    disk: Number  # from 1
     x_mm: Millimetres
     y_mm: Millimetres
 
@@ -129,8 +140,18 @@ def read_message(text: str | bytes) -> Message:
     try:
         return msgspec.json.decode(text, type=Message)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        reason = shown(error, _LONGEST_REASON)
+        reason = shown(_in_words(str(error)), _LONGEST_REASON)
         raise BadMessage(f"Message refused: {reason}.") from None
+
+
+def _in_words(error: str) -> str:
+    """Return an error of msgspec as a sentence that begins with the field."""
+    text, _, place = error.partition(" - at `$.")
+    for pattern, words in _WORDS.items():
+        if found := re.fullmatch(pattern, text):
+            value = _KINDS.get(found[1], found[1])
+            return words.format(field=place.strip("`") or "a message", value=value)
+    return text
 
 
 class Status(msgspec.Struct, tag="status"):

@@ -198,9 +198,11 @@ class Session:
             self._set_goal(jnp.asarray(place, jnp.float32))
             self._goals = CHOSEN
             return
-        robot, disk = self.trial.robot, message.disk - 1
-        if disk >= self._control.disks:
-            raise BadMessage(f"There is no disk {message.disk}.")
+        robot, disk, disks = self.trial.robot, message.disk - 1, self._control.disks
+        if not 0 <= disk < disks:
+            raise BadMessage(
+                f"There is no disk {message.disk}; there are disks 1 to {disks}."
+            )
         self._table.check(place, f"Disk {message.disk}")
         robot.arrange(with_disk_at(robot.scene, robot.truth, disk, place))
         self._observe()
