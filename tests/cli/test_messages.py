@@ -5,6 +5,7 @@ import pickle
 import pytest
 
 from sainet.cli.datasets import Generate
+from sainet.cli.entry import run
 from sainet.cli.help import message
 from sainet.cli.train import Train
 from sainet.runs.errors import BadInput, BadSetting, unknown_name
@@ -49,3 +50,13 @@ def test_unknown_names_suggest_the_nearest():
     assert str(error) == (
         "No model named 'saim' (did you mean sain?). Available: in, sain."
     )
+
+
+@pytest.mark.parametrize(
+    ("word", "nearest"), [("paly", "play"), ("evalute", "evaluate"), ("xyz", None)]
+)
+def test_an_unknown_command_suggests_the_nearest(word, nearest, capsys):
+    assert run([word, "--data", "x"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    hint = f" (did you mean {nearest}?)" if nearest else ""
+    assert line.startswith(f"sainet: No command named '{word}'{hint}. Available: ")

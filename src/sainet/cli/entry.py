@@ -29,7 +29,7 @@ from sainet.cli.reproduce import Reproduce
 from sainet.cli.train import Train
 from sainet.cli.tune import Tune
 from sainet.runs.documents import is_full
-from sainet.runs.errors import BadInput, BadTable, SainetError
+from sainet.runs.errors import BadInput, BadTable, SainetError, unknown_name
 from sainet.runs.interrupts import remembered_interrupts
 
 _COMMANDS = {
@@ -74,9 +74,12 @@ def parse(words: Sequence[str]) -> Any:  # noqa: ANN401
     """Return the command that these words ask for, not yet run.
 
     Raises:
+        UnknownName: there is no such command.
         BadInput: a setting is out of its range.
-        SystemExit: help was asked for (0), or there is no such command or option (2).
+        SystemExit: help was asked for (0), or there is no such option (2).
     """
+    if words and words[0][:1] not in ("-", "") and words[0] not in _COMMANDS:
+        raise unknown_name("command", words[0], _COMMANDS)
     return tyro.cli(
         _COMMAND,
         args=list(words) or ["--help"],
