@@ -159,6 +159,13 @@ def test_a_number_of_steps_that_cannot_be_predicted_is_refused(steps):
         physics.predict(SCENE, state, sn.Push(0.0), steps=steps)
 
 
+@pytest.mark.parametrize("name", ["physics", "in-stroke"])
+def test_models_without_a_range_of_directions_do_not_warn(name):
+    """Warnings are errors here. One disk looks alike from everywhere."""
+    alone = sn.Scene.disks(mass=0.9, radius=0.054)
+    sn.load(name).predict(alone, alone.in_a_row(), sn.Push(3.0), steps=2)
+
+
 def test_networks_refuse_another_time_step():
     fine = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059], time_step=1 / 480)
     with pytest.raises(BadCheckpoint, match="give the scene the same time step"):
@@ -192,7 +199,9 @@ def test_a_state_is_made_of_lists():
     lists = [[0, 0], [0.12, 0]], [0, 1], [-0.06, 0]
     state = sn.at_rest(*lists)
     wanted = sn.at_rest(*(jnp.asarray(each, jnp.float32) for each in lists))
-    for found, same in zip(jax.tree.leaves(state), jax.tree.leaves(wanted), strict=True):
+    for found, same in zip(
+        jax.tree.leaves(state), jax.tree.leaves(wanted), strict=True
+    ):
         assert found.dtype == jnp.float32
         np.testing.assert_array_equal(found, same)
     moved = sn.load("physics").predict(SCENE, state, sn.Push(0.0), steps=20).final

@@ -1,5 +1,6 @@
 """Models: a dynamics model with its identity, and the card of its network."""
 
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import msgspec
 import numpy as np
 from jaxtyping import UInt64
 
+from sainet.engines import RECORDED
 from sainet.engines.simulator import InternalEngine
 from sainet.models.card import Card, Identified
 from sainet.models.dynamics import SAME_TIME, AbstractDynamics, check_purpose, predict
@@ -14,11 +16,13 @@ from sainet.models.identity import ModelId
 from sainet.models.process_card import ProcessCard
 from sainet.models.push_inputs import (
     check_axes,
+    check_kinds,
     compiled,
     is_traced,
     kind_of,
     predict_push,
     steps_of,
+    untrained,
 )
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
@@ -110,10 +114,12 @@ class Model:
             BadScene: a push is out of range, or the parts do not fit each other.
             BadCheckpoint: the network is for other pushes or another time step.
             BadInput: the model is not JAX, and the push is traced.
-            BadSetting: the number of steps is no whole number from 1.
+            BadSetting: a part is not of its type, or the number of steps is no whole
+                number from 1.
         """
         if steps is not None:
             require_count("steps", steps, high=MOST_STEPS)
+        check_kinds(scene, state, push)
         if scene.body_count != state.body_count:
             raise BadScene(
                 f"state: it has {state.body_count} disks, the scene {scene.body_count}."
@@ -129,8 +135,19 @@ class Model:
             return predict(self.dynamics, scene, state, push)
         steps = steps_of(push, scene.time_step) if steps is None else steps
         check_axes(scene, state, push)
+        if disks > 1 and not is_traced(push):
+            self._warn_of_untrained(push)
         run = predict_push if self.dynamics.on_host else compiled
         return run(self.dynamics, scene, state, push, steps)
+
+    def _warn_of_untrained(self, push: Push) -> None:
+        """Warn, where `predict` was called, of directions outside the training range.
+
+        The range of recorded pushes is not known, nor that of lengths and speeds.
+        """
+        if isinstance(self.card, Card) and self.card.truth_engine != RECORDED:
+            for doubt in untrained(push, "contact angle", "direction"):
+                warnings.warn(f"push: {doubt}", stacklevel=3)
 
     def check_fits(
         self,

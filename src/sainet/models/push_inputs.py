@@ -9,9 +9,9 @@ import numpy as np
 from jax.core import Tracer
 
 from sainet.models.dynamics import AbstractDynamics, predict
-from sainet.runs.errors import BadScene
+from sainet.runs.errors import BadScene, require
 from sainet.scenes.controls import Controls, PathControls
-from sainet.scenes.pushes import Push, command_path
+from sainet.scenes.pushes import Push, PushGrid, command_path
 from sainet.scenes.quantities import CONTACT_ANGLE, DIRECTION, SPEED, STROKE
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, Trajectory
@@ -24,6 +24,36 @@ _PARAMETERS = {
     "length": STROKE,
     "speed": SPEED,
 }
+_PARTS = {
+    "scene": (Scene, "a Scene, for example of Scene.disks"),
+    "state": (State, "a State, for example of scene.in_a_row() or at_rest"),
+    "push": ((Push, Controls), "a Push, for example Push(0.2), or Controls"),
+}
+_SLACK = 1e-3  # relative tolerance of the training range
+
+
+def check_kinds(*parts: object) -> None:
+    """Raise `BadSetting` unless scene, state and push are such objects."""
+    for given, (name, (kind, wanted)) in zip(parts, _PARTS.items(), strict=True):
+        require(isinstance(given, kind), name, wanted, given)
+
+
+def untrained(push: Push, *names: str) -> list[str]:
+    """Return a sentence for each parameter of pushes outside the paper's range.
+
+    Args:
+        push: one push or several, not traced.
+        names: of parameters; none: all.
+    """
+    usual, wide = PushGrid(), 1 + _SLACK
+    outside = {
+        "contact angle": np.abs(push.contact_angle) > wide * usual.contact_range,
+        "direction": np.abs(push.direction) > wide * usual.direction_range,
+        "length": np.abs(push.length / usual.length - 1) > _SLACK,
+        "speed": np.abs(push.speed / usual.speed - 1) > _SLACK,
+    }
+    found = [name for name in names or outside if np.any(outside[name])]
+    return [f"its {name} is outside the model's training range" for name in found]
 
 
 def is_traced(tree: object) -> bool:

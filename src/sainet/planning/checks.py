@@ -8,8 +8,9 @@ import numpy as np
 from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics
 from sainet.models.process_card import ProcessCard
+from sainet.models.push_inputs import untrained
 from sainet.runs.errors import BadScene
-from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.pushes import Push
 from sainet.scenes.scene import Scene, pair_gaps
 from sainet.scenes.state import State, check_state
 
@@ -18,7 +19,6 @@ _APART = 5e-3  # m, gap that counts as apart: networks are trained on touching d
 # With fewer training pushes the errors of networks rise steeply: they double from 150
 # to 50 simulated pushes (`sainet reproduce data-efficiency`).
 _FEW_PUSHES = 150
-_SLACK = 1e-3  # relative tolerance of the training range
 _compiled_gaps = eqx.filter_jit(pair_gaps)
 
 
@@ -56,8 +56,7 @@ def doubts(
             "was trained on disks that touch"
         )
     for number, push in enumerate(pushes, start=1):
-        for name in _beyond_training(push):
-            yield f"push {number}: its {name} is outside the model's training range"
+        yield from (f"push {number}: {doubt}" for doubt in untrained(push))
 
 
 def doubts_of_training(card: Card | ProcessCard | None, disks: int) -> Iterator[str]:
@@ -93,16 +92,3 @@ def doubts_of_count(card: Card | ProcessCard | None, disks: int) -> Iterator[str
             f"its {card.noun} was trained on pushes of {known} disk(s), this scene "
             f"has {disks}; train one on such pushes"
         )
-
-
-def _beyond_training(push: Push) -> list[str]:
-    """Return the parameters of a push that are outside the paper's range."""
-    usual = PushGrid()
-    wide = 1 + _SLACK
-    outside = {
-        "contact angle": abs(float(push.contact_angle)) > wide * usual.contact_range,
-        "direction": abs(float(push.direction)) > wide * usual.direction_range,
-        "length": abs(float(push.length) / usual.length - 1) > _SLACK,
-        "speed": abs(float(push.speed) / usual.speed - 1) > _SLACK,
-    }
-    return [name for name, is_outside in outside.items() if is_outside]
