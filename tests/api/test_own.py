@@ -1,5 +1,7 @@
 """Engines and models of a user's own stand beside those of the package."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -11,7 +13,7 @@ from contracts.worlds import make_scene
 from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
-from sainet.engines.simulator import OWN
+from sainet.engines.simulator import OWN, BulletSpec, InternalEngine
 from sainet.models.dynamics import predict
 from sainet.runs.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.scenes.pushes import command_force, command_path
@@ -151,9 +153,31 @@ def test_frictions_of_an_own_engine_are_identified(own, slipped):
     assert found.identified.after_mm < 0.01 < found.identified.before_mm
 
 
-def test_an_engine_without_derivatives_is_not_identified(on_host, slipped):
-    with pytest.raises(BadInput, match="has no derivatives"):
-        sn.identify(slipped, engine=on_host)
+def test_frictions_of_a_step_in_numpy_are_identified(on_host, own, slipped):
+    """By finite differences, which agree with the derivatives of JAX."""
+    by_name = {}
+    for engine in (own, on_host):
+        found = sn.identify(slipped, engine=engine).identified
+        assert found is not None
+        by_name[engine.name] = {each.name: each for each in found.estimates}
+    exact, near = (each["pusher_friction"] for each in by_name.values())
+    assert near.doubt is None
+    assert near.value == pytest.approx(exact.value, rel=1e-4)
+    assert (near.low, near.high) == pytest.approx((exact.low, exact.high), rel=1e-3)
+
+
+def test_an_engine_without_derivatives_is_not_identified(slipped):
+    """Bullet, which is not built."""
+    bullet = InternalEngine(BulletSpec())
+    physics = replace(sn.load("physics"), internal=bullet)
+    with pytest.raises(BadInput, match="`engine` is bullet, which has no derivatives"):
+        sn.identify(slipped, engine=physics)
+
+
+def test_errors_of_a_step_in_numpy_stay_as_they_are():
+    wrong = sn.from_step(lambda scene, state: (1, 2), name="wrong", numpy=True)
+    with pytest.raises(BadInput, match="returns a tuple; it must be a State"):
+        final(wrong)
 
 
 def carry(scene, initial, controls):
@@ -192,6 +216,13 @@ def test_a_function_that_returns_another_shape_is_refused():
     flat = sn.from_function(lambda s, i, c: np.zeros((3, 60, 6)), name="flat")
     with pytest.raises(BadInput, match=r"\[3, 60, 6\]; it must be \[3, 60, 2, 3\]"):
         final(flat)
+
+
+def test_the_message_about_a_shape_names_the_pushes_of_the_dataset(pushes):
+    flat = sn.from_function(lambda s, i, c: np.zeros((3, 2)), name="flat")
+    steps = pushes.store.info.steps
+    with pytest.raises(BadInput, match=rf"\[3, 2\]; it must be \[12, {steps}, 2, 3\]"):
+        sn.evaluate([flat], pushes)
 
 
 @pytest.mark.parametrize("kind", ["own", "on_host", "function"])

@@ -1,7 +1,8 @@
 """Engines of a user's own: a step function becomes a simulator."""
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -16,14 +17,18 @@ from sainet.engines.simulator import OWN, InternalEngine, OwnSpec
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.models.push_inputs import is_traced
 from sainet.runs.documents import checked
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, Trajectory
+from sainet.scenes.state import State, Trajectory, unpack_motion
 
 Step = Callable[[Scene, State], State]
+Run = Callable[..., np.ndarray]  # of pushes, on the host
+Part = Any  # an array of JAX or NumPy, or a part of a model of MuJoCo
 _DISKS = ("position", "angle", "velocity", "spin")
+_CHANGE = 2e-4  # m, or of a friction: half the distance of finite differences
 
 
 class AbstractPathEngine(AbstractEngine):
@@ -57,6 +62,72 @@ class AbstractPathEngine(AbstractEngine):
         return Trajectory(
             jax.tree.map(lambda x: x.reshape(*shape, *x.shape[1:]), found)
         )
+
+
+class AbstractHostEngine(AbstractPathEngine):
+    """An engine on NumPy arrays; JAX calls it, with finite differences as slopes."""
+
+    @abstractmethod
+    def motion(self, scene: Scene, initial: State, path: np.ndarray) -> np.ndarray:
+        """Return the motion after each step, [push, time, body, 6].
+
+        Args:
+            scene: of each push; here all arrays are NumPy's.
+            initial: state before each push.
+            path: of the pusher with its start, [push, time + 1, 2] (m).
+        """
+
+    def states(self, scene: Scene, initial: State, controls: Controls) -> State:
+        """Return the states after each step, [push, time, ...]."""
+        start = initial.pusher_position[:, None]
+        path = jnp.concatenate([start, controls.command], axis=1)
+        given, form = jax.tree.flatten((scene, initial, path))
+        (pushes, bodies), steps = scene.mass.shape, controls.steps
+
+        def run(*arrays: Part) -> np.ndarray:
+            return self.motion(*jax.tree.unflatten(form, map(np.asarray, arrays)))
+
+        # Outside JAX's callbacks, errors of a user's function stay as they are.
+        if self.on_host and not is_traced(given):
+            motion = jnp.asarray(run(*given))
+        else:
+            motion = _motion(run, (pushes, steps, bodies, 6), *given)
+        speed = jnp.diff(path, axis=1) / scene.time_step
+        return unpack_motion(motion, path[:, 1:], speed)
+
+
+def _called(run: Run, shape: tuple[int, ...], *arrays: Part) -> Array:
+    """Return what a function returns on the host."""
+    kind = jax.ShapeDtypeStruct(shape, jnp.float32)
+    return jax.pure_callback(run, kind, *arrays, vmap_method="sequential")
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
+def _motion(run: Run, shape: tuple[int, ...], *arrays: Array) -> Array:
+    """Return the motion from `AbstractHostEngine.motion`."""
+    return _called(run, shape, *arrays)
+
+
+@_motion.defjvp
+def _slope(
+    run: Run, shape: tuple[int, ...], at: Sequence[Array], by: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Return the motion and its derivative, from central differences."""
+
+    def along(*pairs: tuple[Array, Array]) -> np.ndarray:
+        exact = [np.asarray(pair, np.float64) for pair in pairs]
+        size = _CHANGE / max(*(np.abs(change).max() for _, change in exact), 1e-30)
+        ends = [run(*(x + way * dx for x, dx in exact)) for way in (size, -size)]
+        return (ends[0] - ends[1]) / np.float32(2 * size)
+
+    pairs = zip(at, by, strict=True)
+    return _motion(run, shape, *at), _called(along, shape, *pairs)
+
+
+def packed(state: State) -> np.ndarray:
+    """Return the motion of a state of NumPy arrays, as `pack_motion` does of JAX's."""
+    rates = state.velocity, state.spin[..., None]
+    return np.concatenate([state.position, state.angle[..., None], *rates], axis=-1)
 
 
 class AbstractStepEngine(AbstractPathEngine):
@@ -117,8 +188,8 @@ class StepEngine(AbstractStepEngine):
         return jax.tree.map(lambda x: jnp.moveaxis(x, 0, 1), states)
 
 
-class HostStepEngine(AbstractStepEngine):
-    """A step function on NumPy arrays: not compiled, and without derivatives."""
+class HostStepEngine(AbstractHostEngine, AbstractStepEngine):
+    """A step function on NumPy arrays: not compiled."""
 
     step: Step
     name: str = eqx.field(static=True)
@@ -128,16 +199,13 @@ class HostStepEngine(AbstractStepEngine):
         """True: it runs outside JAX."""
         return True
 
-    def states(self, scene: Scene, initial: State, controls: Controls) -> State:
-        """Return the states after each step, [push, time, ...]."""
-        scene, state, path = jax.tree.map(
-            np.asarray, (scene, initial, controls.command)
-        )
-        found: list[State] = []
-        for time in range(path.shape[1]):
+    def motion(self, scene: Scene, initial: State, path: np.ndarray) -> np.ndarray:
+        """Return the motion after each step, [push, time, body, 6]."""
+        state, found = initial, list[np.ndarray]()
+        for time in range(1, path.shape[1]):
             state = self.after(scene, state, path[:, time])
-            found.append(state)
-        return jax.tree.map(lambda *x: jnp.stack([*map(jnp.asarray, x)], 1), *found)
+            found.append(packed(state))
+        return np.stack(found, axis=1, dtype=np.float32)
 
 
 def from_step(step: Step, *, name: str, numpy: bool = False, version: int = 1) -> Model:
@@ -168,8 +236,8 @@ def from_step(step: Step, *, name: str, numpy: bool = False, version: int = 1) -
             Velocities fit the poses: p(t+1) = p(t) + dt * v(t+1).
         name: of the engine: letters, digits, "_", "." and "-". A network that was
             trained around it is loaded where an engine of this name was made before.
-        numpy: the function takes NumPy arrays; then it is neither compiled nor
-            differentiated, and `jax.vmap` does not apply to the model.
+        numpy: the function takes NumPy arrays; then it is not compiled, `identify`
+            takes finite differences, and `jax.vmap` does not apply to the model.
         version: of the equations; a folder of an older version is not continued.
 
     Raises:

@@ -17,7 +17,7 @@ from sainet.learning.fit import fit
 from sainet.learning.log import reported
 from sainet.learning.process import fit_process, fits_of
 from sainet.learning.recipes import FROM_ENGINE, Recipe, recipe_for, start_named
-from sainet.models.identity import NETWORKS, ModelKind, ProcessFeatures
+from sainet.models.identity import LEARNED, ModelKind, ProcessFeatures
 from sainet.models.library import find_internal_engine, identified_physics
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
@@ -38,10 +38,10 @@ def identify(
 
     Args:
         pushes: along paths, observed at least at their ends.
-        engine: the planar engine, or one of your own in JAX (`from_step`) or from an
-            MJCF file (`from_mjcf`): of that, frictions and camera offset are
-            estimated, as far as its step depends on the frictions of the scene. Step
-            functions outside JAX have no derivatives.
+        engine: the planar engine, or one of your own (`from_step`, `from_mjcf`): of
+            that, frictions and camera offset are estimated, as far as its step depends
+            on the frictions of the scene. Outside JAX, derivatives are finite
+            differences.
         out: run folder to write, which commands take as a model; None: no files.
         progress: show a progress bar; None: on a terminal.
 
@@ -107,12 +107,13 @@ def tune(
         progress: show a progress bar; None: on a terminal.
 
     Raises:
+        BadSetting: there is no such kind of model.
         BadStore: the data lack inputs of the network.
         BadCheckpoint: training cannot start from that network.
         RunConflict: the folder belongs to another run.
         Diverged: the loss became NaN or infinite.
     """
-    require_one_of("model", model, (*NETWORKS, "gp"))
+    require_one_of("model", model, LEARNED)
     given = {"iterations": iterations, "seed": seed}
     if model == "gp":
         if recipe is not None or start != FROM_ENGINE:

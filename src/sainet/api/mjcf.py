@@ -1,31 +1,25 @@
 """Engines from MJCF files: MuJoCo simulates disks and a pusher."""
 
 import re
-from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from collections.abc import Sequence
+from functools import lru_cache
 from hashlib import sha256
 from math import ceil
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from sainet.api.engines import AbstractPathEngine, own_model
+from sainet.api.engines import AbstractHostEngine, Part, own_model, packed
 from sainet.engines.simulator import OwnSpec
 from sainet.models.model import Model
 from sainet.runs.documents import checked
 from sainet.runs.errors import BadInput, MissingExtra, shown
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, pack_motion, unpack_motion
-
-Run = Callable[..., np.ndarray]  # of a push, on the host
-Part = Any  # a model or a body of MuJoCo, which its stubs leave open
+from sainet.scenes.state import State
 
 # Joints of a disk: the first three are its pose. All six replace a free joint; their
 # angle is never wrapped.
@@ -38,7 +32,6 @@ _KEPT = ("size", "pos", "quat", "condim", "solref", "solimp", "margin", "gap")
 _SETTLED = 0.1  # s, until disks rest on the table
 _HEAVY = 1e3  # kg, so that contacts do not slow the pusher within a substep
 _PROPERTIES = ("table_friction", "disk_friction", "pusher_friction", "pusher_radius")
-_CHANGE = 2e-4  # m, or of a friction: half the distance of finite differences
 _DIGEST = 8  # characters that distinguish contents of a file
 
 
@@ -199,33 +192,7 @@ def _touching(body: Part, contype: int, conaffinity: int) -> list[Part]:
     return geoms
 
 
-def _called(run: Run, like: Sequence[Array], *arrays: Part) -> Array:
-    """Return what a function returns on the host, [push, time, body, 6]."""
-    (pushes, *body), steps = like[1].shape, like[2].shape[1] - 1
-    shape = jax.ShapeDtypeStruct((pushes, steps, *body), jnp.float32)
-    return jax.pure_callback(run, shape, *arrays, vmap_method="sequential")
-
-
-@partial(jax.custom_jvp, nondiff_argnums=(0,))
-def _motion(run: Run, *arrays: Array) -> Array:
-    """Return the motion from `Pucks.run`."""
-    return _called(run, arrays, *arrays)
-
-
-@_motion.defjvp
-def _slope(run: Run, at: Sequence[Array], by: Sequence[Array]) -> tuple[Array, Array]:
-    """Return the motion and its derivative, from central differences."""
-
-    def along(*pairs: tuple[Array, Array]) -> np.ndarray:
-        exact = [np.asarray(pair, np.float64) for pair in pairs]
-        size = _CHANGE / max(*(np.abs(change).max() for _, change in exact), 1e-30)
-        ends = [run(*(x + way * dx for x, dx in exact)) for way in (size, -size)]
-        return (ends[0] - ends[1]) / np.float32(2 * size)
-
-    return _motion(run, *at), _called(along, at, *zip(at, by, strict=True))
-
-
-class MjcfEngine(AbstractPathEngine):
+class MjcfEngine(AbstractHostEngine):
     """MuJoCo, called from JAX; derivatives are finite differences."""
 
     name: str = eqx.field(static=True)
@@ -240,14 +207,13 @@ class MjcfEngine(AbstractPathEngine):
         count, wanted = len(self.pucks.disks), scene.body_count
         what = f"it has {count} disks, the scene {wanted}; give both as many"
         self.pucks.check(count == wanted, what)
-        others = jnp.stack([getattr(scene, name) for name in _PROPERTIES], axis=-1)
-        values = jnp.concatenate([scene.mass, scene.radius, others], axis=-1)
-        start = initial.pusher_position[:, None]
-        path = jnp.concatenate([start, controls.command], axis=1)
-        speed = jnp.diff(path, axis=1) / scene.time_step
-        run = partial(self.pucks.run, scene.time_step)
-        motion = _motion(run, values, pack_motion(initial), path)
-        return unpack_motion(motion, path[:, 1:], speed)
+        return super().states(scene, initial, controls)
+
+    def motion(self, scene: Scene, initial: State, path: np.ndarray) -> np.ndarray:
+        """Return the motion after each step, [push, time, body, 6]."""
+        others = np.stack([getattr(scene, name) for name in _PROPERTIES], axis=-1)
+        values = np.concatenate([scene.mass, scene.radius, others], axis=-1)
+        return self.pucks.run(scene.time_step, values, packed(initial), path)
 
 
 def from_mjcf(path: PathLike[str] | str, *, name: str | None = None) -> Model:

@@ -79,6 +79,7 @@ def predict_all(
         Diverged: a prediction is not finite.
     """
     store, arrays = pushes.store, pushes.arrays
+    few = 1 if model.dynamics.on_host and not model.card else _FEW  # none compiled
     poses: list[np.ndarray] = []
     stored = None
     if model.internal and (known := Prediction(model.internal, store.info)).is_stored:
@@ -88,7 +89,7 @@ def predict_all(
         found: list[np.ndarray] = []
         for start in range(0, len(part), _BATCH):
             rows = part[start : start + _BATCH]
-            whole = np.resize(rows, min(_BATCH, -(-len(part) // _FEW) * _FEW))
+            whole = np.resize(rows, min(_BATCH, -(-len(part) // few) * few))
             some = {name: array[whole] for name, array in arrays.items()}
             batch = to_batch(some, store.info, steps=steps, simulated=stored)
             pose = _predict(model.dynamics, batch)

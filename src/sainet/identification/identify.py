@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from sainet.datasets.groups import groups_of
 from sainet.datasets.store import Store
-from sainet.engines.simulator import SimulatorSpec
+from sainet.engines.simulator import OwnSpec, SimulatorSpec
 from sainet.identification.parameters import (
     BOUNDS,
     FRICTIONS,
@@ -147,14 +147,14 @@ def identify(
 
     Args:
         store: pushes along paths, with observed final poses at least.
-        simulator: planar, or an engine of the user's own in JAX, of which frictions and
-            camera offset are estimated.
+        simulator: planar, or an engine of the user's own, of which frictions and camera
+            offset are estimated.
         on_try: called with the root mean square error of each trial solution; about 1
             at the start.
 
     Raises:
         BadStore: no pose was observed, or forces drive the pusher.
-        BadInput: the engine does not run in JAX, so that it has no derivatives.
+        BadInput: the engine has no derivatives.
     """
     check_store(store)
     parts = samples(store, _own_engine(simulator))
@@ -193,13 +193,12 @@ def _own_engine(simulator: SimulatorSpec) -> Own:
     """Return an engine of the user's own; None for the planar engine."""
     if simulator.engine == PLANAR.engine:
         return None
-    engine = simulator.build().engine
-    if engine.on_host:
+    if not isinstance(simulator, OwnSpec):
         raise BadInput(
-            "`engine` does not run in JAX and has no derivatives, so that no "
-            "parameter can be identified; estimate its parameters yourself."
+            f"`engine` is {simulator.engine}, which has no derivatives, so that no "
+            "parameter can be identified; use planar, or an engine of your own."
         )
-    return engine
+    return simulator.build().engine
 
 
 def _tell_of_one_value(store: Store, start: Mapping[str, float]) -> None:

@@ -4,7 +4,8 @@ from sainet.engines.simulator import SIMULATORS, PlanarSpec, SimulatorSpec
 from sainet.learning.recipes import FROM_ENGINE
 from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD
-from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
+from sainet.models.identity import NETWORKS
+from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, require_one_of
 
 
 def check_task(task: Task) -> None:
@@ -16,6 +17,7 @@ def check_task(task: Task) -> None:
         BadCheckpoint: training cannot start from that network.
     """
     path = task.store.path
+    require_one_of("model", task.model, NETWORKS)
     _check_simulator(task)
     if task.is_additive and task.inner is None:
         raise BadInput(
