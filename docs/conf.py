@@ -52,6 +52,7 @@ autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
+napoleon_attr_annotations = False  # shapes stand in the text
 napoleon_use_ivar = True
 python_use_unqualified_type_names = True
 add_module_names = False
