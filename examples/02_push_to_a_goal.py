@@ -33,6 +33,6 @@ def tell(step: ControlStep) -> None:
     print(f"{away:6.1f} mm to go: contact {push[0]:+.0f}, direction {push[1]:+.0f} deg")
 
 
-sain = sn.load("sain").dynamics
-episode = run_episode(robot, make_planner("greedy"), sain, task, scene, on_step=tell)
+planner = make_planner("greedy")
+episode = run_episode(robot, planner, "sain", task, scene, on_step=tell)
 print(f"{episode.reason} after {len(episode.steps)} pushes")

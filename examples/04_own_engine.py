@@ -24,4 +24,4 @@ table = sn.evaluate({"physics": "physics", "own": carrying, "sain": network}, te
 print(table)
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
 task, planner = PushToGoal(jnp.array([0.2, 0.05])), sn.make_planner("greedy")
-print(planner.plan(network.dynamics, task, scene, scene.in_a_row()).pushes[0])
+print(planner.plan(network, task, scene, scene.in_a_row()).pushes[0])

@@ -15,7 +15,7 @@ from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.simulator import OWN, BulletSpec, InternalEngine
 from sainet.models.dynamics import predict
-from sainet.runs.errors import BadCheckpoint, BadInput, UnknownName
+from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.scenes.pushes import command_force, command_path
 from sainet.tasks.push_to_goal import PushToGoal
 
@@ -223,6 +223,51 @@ def test_the_message_about_a_shape_names_the_pushes_of_the_dataset(pushes):
     steps = pushes.store.info.steps
     with pytest.raises(BadInput, match=rf"\[3, 2\]; it must be \[12, {steps}, 2, 3\]"):
         sn.evaluate([flat], pushes)
+
+
+def shove(scene, initial, controls):
+    """As `carry`, and disk 1 moves disk 2 out of its way."""
+    poses = carry(scene, initial, controls)
+    between = poses[:, :, 1, :2] - poses[:, :, 0, :2]
+    distance = np.linalg.norm(between, axis=-1, keepdims=True)
+    overlap = np.maximum(scene.radius.sum(axis=-1)[:, None, None] - distance, 0)
+    poses[:, :, 1, :2] += overlap * between / distance
+    return poses
+
+
+def test_a_function_controls_beside_ours(tmp_path):
+    """Episodes towards the same goals, with models of a user's own and by name."""
+    config = sn.ControlConfig(model="physics", pushes=3, trials=2, noise_level="none")
+    shoved = sn.from_function(shove, name="shoved")
+    own = sn.run_trials(config, tmp_path / "own", model=shoved)
+    assert [each.model for each in own] == ["shoved", "shoved"]
+    ours = sn.run_trials(config, str(tmp_path / "ours"))
+    again = sn.run_trials(config, model="physics")  # in a temporary folder
+    assert [each.model for each in again] == ["physics", "physics"]
+    for one, other, same in zip(own, ours, again, strict=True):
+        assert one.goal_mm == other.goal_mm
+        assert one.final_mm < one.steps[0].distance_mm - 5  # 3 pushes of 10 mm
+        assert other.final == same.final
+    resumed = sn.run_trials(config, tmp_path / "own", model=shoved)
+    assert resumed[0].decision_s == own[0].decision_s
+    with pytest.raises(RunConflict):
+        sn.run_trials(config, tmp_path / "own", model="sain")
+
+
+def test_a_network_that_a_user_trained_controls(pushes):
+    """One in memory, whose folder is gone."""
+    config = sn.ControlConfig(pushes=1, trials=1)
+    network = sn.tune("sain", pushes, iterations=1).called("mine")
+    (found,) = sn.run_trials(config, model=network)
+    assert found.model == "mine"
+
+
+def test_predictions_in_a_file_refuse_to_control(pushes, tmp_path):
+    steps = pushes.store.info.steps
+    np.savez(tmp_path / "own.npz", pose=np.zeros((12, steps, 2, 3)))
+    model = sn.from_predictions(tmp_path / "own.npz", pushes)
+    with pytest.raises(BadInput, match="can neither predict others nor plan"):
+        sn.run_trials(sn.ControlConfig(pushes=1, trials=1), model=model)
 
 
 @pytest.mark.parametrize("kind", ["own", "on_host", "function"])

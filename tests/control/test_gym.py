@@ -17,7 +17,7 @@ from sainet.control.gym.registration import PUSH_DISKS
 from sainet.control.trials import run_trials
 from sainet.report import palette
 from sainet.robots.simulated import SimulatedRobot
-from sainet.runs.errors import BadInput, BadSetting
+from sainet.runs.errors import BadInput, BadSetting, UnknownName
 from support import require
 
 MODULES = {"planar": "jax", "bullet": "pybullet", "lab": "mujoco"}
@@ -192,6 +192,33 @@ def test_impossible_options_are_named(options, says):
     for maker in (gymnasium.make, gymnasium.make_vec):
         with pytest.raises(BadInput, match=says):
             maker(PUSH_DISKS, **options)
+
+
+@pytest.mark.parametrize("maker", [gymnasium.make, gymnasium.make_vec])
+def test_unknown_options_suggest_the_nearest(maker):
+    with pytest.raises(BadInput, match=r"^No option named 'goal' \(did you mean goals"):
+        maker(PUSH_DISKS, goal="hard")
+
+
+def test_many_environments_draw_no_pictures():
+    words = "`render_mode` is rgb_array; it must be None if `vectorization_mode`"
+    with pytest.raises(BadSetting, match=words):
+        make_many(2, render_mode="rgb_array")
+    assert make_many(2, render_mode=None).num_envs == 2
+
+
+def test_a_policy_takes_a_model_by_name_and_refuses_an_environment():
+    code = f"""
+import gymnasium, sainet as sn
+env = gymnasium.make('{PUSH_DISKS}')
+policy = sn.GreedyPlanner("physics", env.unwrapped.task)
+assert policy.act(env.reset(seed=0)[0]) in env.action_space
+sn.TreePlanner("physics", env)"""
+    says = run(code).stderr.splitlines()[-1]
+    assert says.startswith("sainet.runs.errors.BadSetting: `task` is <")
+    assert says.endswith("it must be that of an environment, env.unwrapped.task.")
+    with pytest.raises(UnknownName, match=r"did you mean sain\?"):
+        sn.TreePlanner("sani", make().unwrapped.task)
 
 
 def test_unknown_names_are_named():

@@ -94,7 +94,8 @@ def _pose(state: State) -> Any:  # noqa: ANN401
 def from_function(function: Predict, *, name: str) -> Model:
     """Return a model that predicts with a function of your own on NumPy arrays.
 
-    It is evaluated and plans beside the models of the package.
+    It is evaluated and plans beside the models of the package: `evaluate`, `run_trials`
+    and planners take it.
 
     Example: disk 1 moves as the pusher does::
 
@@ -113,7 +114,7 @@ def from_function(function: Predict, *, name: str) -> Model:
         @torch.no_grad()
         def predict(scene, initial, controls):
             inputs = (scene.mass, scene.radius, initial.position, controls.position)
-            return module(*map(torch.from_numpy, inputs)).numpy()
+            return module(*map(torch.tensor, inputs)).numpy()
 
     Args:
         function: `function(scene, initial, controls)` returns the poses (m, m, rad)

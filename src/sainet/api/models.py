@@ -1,16 +1,10 @@
 """Models in scripts, given by name, as folder or as object."""
 
-import os
-
 import jax
 
-from sainet.models.dynamics import AbstractDynamics
-from sainet.models.identity import ModelId
-from sainet.models.library import load_model
+from sainet.models.library import Loadable, as_model
 from sainet.models.model import Model
 from sainet.runs.manifest import WORTH_KEEPING, cache_folder
-
-Loadable = Model | AbstractDynamics | os.PathLike[str] | str
 
 
 def load(model: Loadable, *, engine: str | None = None) -> Model:
@@ -33,12 +27,7 @@ def load(model: Loadable, *, engine: str | None = None) -> Model:
         MissingExtra: the engine needs a package that is not installed.
     """
     _keep_compiled()
-    if isinstance(model, Model):
-        return model
-    if isinstance(model, AbstractDynamics):
-        name = type(model).__name__.lower()
-        return Model(ModelId(kind="physics", name=name), model)
-    return load_model(os.fspath(model), engine=engine)
+    return as_model(model, engine=engine)
 
 
 def _keep_compiled() -> None:

@@ -80,6 +80,9 @@ class ControlConfig(RobotConfig):
     def __post_init__(self) -> None:
         """Check every setting."""
         super().__post_init__()
+        is_name = isinstance(self.model, str)  # pyright: ignore
+        wanted = "a name or a folder; `run_trials` takes a model of your own"
+        require(is_name, "model", wanted, self.model)
         for name, (low, high) in _COUNTS.items():
             require_count(name, getattr(self, name), low=low, high=high)
         require_one_of("goals", self.goals, get_args(Goals))

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.identification.adaptation import Adaptation
-from sainet.models.dynamics import AbstractDynamics
+from sainet.models.library import Loadable, as_model
 from sainet.planning.base import AbstractPlanner, Plan
 from sainet.robots.base import AbstractRobot
 from sainet.runs.errors import BadScene, Diverged
@@ -66,7 +66,7 @@ class Episode:
 def run_episode(
     robot: AbstractRobot,
     planner: AbstractPlanner,
-    dynamics: AbstractDynamics,
+    model: Loadable,
     task: AbstractTask,
     scene: Scene,
     *,
@@ -80,12 +80,12 @@ def run_episode(
     Args:
         robot: observes and executes pushes.
         planner: selects pushes.
-        dynamics: model that predicts.
+        model: predicts; as `load` takes it, by name for example, or its dynamics.
         task: task to solve.
         scene: properties given to model and task.
         pushes: maximum number of pushes.
         episode: filled during the episode, so that an interruption keeps its steps.
-        adaptation: estimates properties from the pushes; replaces `dynamics`, and the
+        adaptation: estimates properties from the pushes; replaces `model`, and the
             scene that plans are made with. None: the given properties stay.
         on_step: called after each push.
 
@@ -96,6 +96,7 @@ def run_episode(
         BadScene: a property is out of its range.
     """
     check_scene(scene)
+    given = as_model(model).dynamics, scene
     episode = episode or Episode()
     troubles = 0
     while True:
@@ -105,16 +106,16 @@ def run_episode(
         if len(episode.steps) == pushes:
             return _end(episode, _out_of_pushes(task, planner, episode, pushes))
         start = time.perf_counter()
-        model = (dynamics, scene) if adaptation is None else adaptation.adapted(state)
+        now = given if adaptation is None else adaptation.adapted(state)
         try:
-            plan = planner.plan(model[0], task, model[1], state)
+            plan = planner.plan(now[0], task, now[1], state)
         except (BadScene, Diverged) as error:
             return _end(episode, f"planning failed: {error}")
         seconds = time.perf_counter() - start
         recording = checked(robot.push(plan.pushes[0]), plan.pushes[0])
         if adaptation is not None:
             adaptation.add(recording)
-        episode.steps.append(ControlStep(state, plan, recording, seconds, model[1]))
+        episode.steps.append(ControlStep(state, plan, recording, seconds, now[1]))
         on_step(episode.steps[-1])
         troubles = troubles + 1 if recording.trouble else 0
         if troubles == MOST_TROUBLES:

@@ -3,8 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 from itertools import chain
+from os import PathLike, fspath
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import jax
 import numpy as np
@@ -24,13 +27,14 @@ from sainet.control.trial import make_trial
 from sainet.engines import make_engine
 from sainet.evaluation.measurements import Condition, Header, Measurements
 from sainet.identification.adaptation import Adaptation, check_adapts
+from sainet.models.dynamics import AbstractDynamics
 from sainet.models.identity import ModelId
-from sainet.models.library import load_model
+from sainet.models.library import Loadable, as_model, load_model
 from sainet.models.model import Model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, require
 from sainet.runs.folders import open_run
 from sainet.runs.shards import Shard, collect, open_share
 from sainet.runs.workers import each_done
@@ -39,8 +43,9 @@ from sainet.scenes.scene import TIME_STEP
 
 def run_trials(
     config: ControlConfig,
-    out: Path,
+    out: PathLike[str] | str | None = None,
     *,
+    model: Loadable | None = None,
     executor: Executor | None = None,
     on_episode: Callable[[EpisodeRecord], None] = lambda episode: None,
 ) -> list[EpisodeRecord]:
@@ -48,7 +53,11 @@ def run_trials(
 
     Args:
         config: model, planner, world and goals.
-        out: the run folder, with one file per episode.
+        out: the run folder, with one file per episode; None: a temporary folder,
+            deleted at the end.
+        model: that plans, in the place of that of `config`: of your own for example,
+            as `load` takes it. A folder knows it by name and weights only: give a
+            function that you changed another folder.
         executor: runs the episodes; None runs them in this process, one by one.
         on_episode: called with each record when it is available.
 
@@ -56,15 +65,23 @@ def run_trials(
         RunConflict: the folder belongs to another run.
         BadInput: the model is for other pushes, or an episode is damaged.
     """
-    model, _ = prepare(config)  # report errors before any output
-    settings = _settings(model, config)
+    is_config = isinstance(config, ControlConfig)  # pyright: ignore
+    wanted = "a ControlConfig; give a model of your own as `model`"
+    require(is_config, "config", wanted, config)
+    if out is None:
+        with TemporaryDirectory() as temporary:
+            run = partial(run_trials, model=model, executor=executor)
+            return run(config, temporary, on_episode=on_episode)
+    config, own, out = *_with_model(config, model), Path(out)
+    loaded, _ = prepare(config, own)  # report errors before any output
+    settings = _settings(loaded, config)
     folder = open_run(out, settings, finished_by=SUMMARY, devices=jax.device_count())
     shards = None if folder.is_finished else collect(out, settings)
     files = [episode_file(out, trial) for trial in range(config.trials)]
     known = {index for index, path in enumerate(files) if path.is_file()}
     for index in sorted(known):
         on_episode(read_record(files[index]))
-    missing = [(config, out, i) for i in range(config.trials) if i not in known]
+    missing = [(config, out, i, own) for i in range(config.trials) if i not in known]
     if shards is not None:
         shards.tell(len(missing), config.trials)
     for index in each_done(executor, run_trial, missing):
@@ -75,6 +92,18 @@ def run_trials(
         shards.clear()
     write_document(folder.path / SUMMARY, Finished(names))
     return records
+
+
+def _with_model(
+    config: ControlConfig, model: Loadable | None
+) -> tuple[ControlConfig, Model | None]:
+    """Return settings that name a model, and the model itself unless it is a name."""
+    if model is None:
+        return config, None
+    if isinstance(model, Model | AbstractDynamics):
+        own = as_model(model)
+        return replace(config, model=own.name), own
+    return replace(config, model=fspath(model)), None
 
 
 def _settings(model: Model, config: ControlConfig) -> dict[str, object]:
@@ -115,12 +144,14 @@ def run_share(
     return len(own)
 
 
-def run_trial(config: ControlConfig, out: Path, index: int) -> int:
+def run_trial(
+    config: ControlConfig, out: Path, index: int, own: Model | None = None
+) -> int:
     """Run and record one episode (the job of a worker) and return its index.
 
     The record of an interrupted episode has another name.
     """
-    model, planner = prepare(config)
+    model, planner = prepare(config, own)
     trial, episode = make_trial(config, index), Episode()
     task = replace(trial.task, tolerance=config.stopping_tolerance * config.tolerance)
     path = episode_file(out, index)
@@ -129,7 +160,7 @@ def run_trial(config: ControlConfig, out: Path, index: int) -> int:
             run_episode(
                 robot,
                 planner,
-                model.dynamics,
+                model,
                 task,
                 trial.scene,
                 pushes=config.pushes,
@@ -151,20 +182,24 @@ def rehearse_trials(config: ControlConfig, *, on_trial: Callable[[int], None]) -
     for index in range(config.trials):
         trial = make_trial(config, index)
         with trial.robot as robot:
-            run_episode(
-                robot, planner, model.dynamics, trial.task, trial.scene, pushes=1
-            )
+            run_episode(robot, planner, model, trial.task, trial.scene, pushes=1)
         on_trial(index)
 
 
-def prepare(config: ControlConfig) -> tuple[Model, AbstractPlanner]:
+def prepare(
+    config: ControlConfig, own: Model | None = None
+) -> tuple[Model, AbstractPlanner]:
     """Return model and planner; loading the same model again compiles nothing.
+
+    Args:
+        config: names the model.
+        own: model in its place.
 
     Raises:
         BadInput: model, planner or world is unknown, or the model is for other pushes.
     """
     follows = config.swapped and config.given_properties == "true"
-    model = load_model(config.model, order=(1, 0) if follows else None)
+    model = own or load_model(config.model, order=(1, 0) if follows else None)
     model.check_fits("robot", TIME_STEP)
     if config.adapt:
         check_adapts(model)

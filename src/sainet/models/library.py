@@ -1,5 +1,6 @@
 """Models by name: physics, a shipped network, or the folder of a trained one."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -50,6 +51,20 @@ OF_ANY_NUMBER = ("sain-any",)  # of disks: a contact network
 SHIPPED = (*OF_PAPER, *OF_STROKES, *OF_ANY_NUMBER)
 _PAPER_DISKS = 2
 MODELS = (*PHYSICS, *SHIPPED)
+Loadable = Model | AbstractDynamics | os.PathLike[str] | str
+
+
+def as_model(model: Loadable, *, engine: str | None = None) -> Model:
+    """Return a model that is given by name, as folder or as object; see `load_model`.
+
+    Dynamics of a user's own become a model.
+    """
+    if isinstance(model, Model):
+        return model
+    if isinstance(model, AbstractDynamics):
+        name = type(model).__name__.lower()
+        return Model(ModelId(kind="physics", name=name), model)
+    return load_model(os.fspath(model), engine=engine)
 
 
 def shipped_for(disks: int) -> tuple[str, ...]:

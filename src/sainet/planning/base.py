@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sainet.models.dynamics import AbstractDynamics, check_purpose
+from sainet.models.library import Loadable, as_model
 from sainet.planning.checks import check_observation, doubts
 from sainet.planning.levels import Found, Problem, batch_of, roll_pushes
 from sainet.scenes.controls import PathControls
@@ -60,12 +61,12 @@ class AbstractPlanner(eqx.Module):
         """Return the best sequence of actions, as indices into the grid."""
 
     def plan(
-        self, dynamics: AbstractDynamics, task: AbstractTask, scene: Scene, state: State
+        self, model: Loadable, task: AbstractTask, scene: Scene, state: State
     ) -> Plan:
         """Return the plan for the next pushes, with its predicted path.
 
         Args:
-            dynamics: model that predicts.
+            model: predicts; a model, its dynamics, its name or its folder.
             task: task to solve.
             scene: one scene, without a batch axis, with the properties for the model.
             state: observed state, assumed to be at rest.
@@ -76,7 +77,8 @@ class AbstractPlanner(eqx.Module):
             BadCheckpoint: the model is for another time step or other controls.
             Diverged: no candidate push has a finite prediction.
         """
-        kind, disks = PathControls.kind, scene.body_count
+        dynamics, kind = as_model(model).dynamics, PathControls.kind
+        disks = scene.body_count
         check_purpose(dynamics, kind, scene.time_step, disks)
         gap = check_observation(scene, state)
         problem = Problem(dynamics, task, scene, state, self.actions, self.expected)

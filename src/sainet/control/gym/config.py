@@ -1,12 +1,12 @@
 """Options of the environment, the keywords of `gymnasium.make`; free of JAX."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from sainet.control.config import ControlConfig, GivenProperties, Goals
 from sainet.control.worlds import TableConfig
 from sainet.robots import Surface
-from sainet.runs.errors import require, require_one_of
+from sainet.runs.errors import require, require_one_of, unknown_name
 
 if TYPE_CHECKING:
     from sainet.control.gym.actions import ActionKind
@@ -50,6 +50,20 @@ class PushDisksConfig(TableConfig):
         for name in ("noise_level",) if is_lab else ("lab", "surface"):
             value, usual = getattr(self, name), getattr(type(self), name)
             require(value == usual, name, wanted, value)
+
+    @classmethod
+    def of(cls, **options: Any) -> "PushDisksConfig":  # noqa: ANN401
+        """Return the configuration with these options.
+
+        Raises:
+            UnknownName: there is no option of a name.
+            BadSetting: an option has a value that cannot be used.
+        """
+        known = [each.name for each in fields(cls)]
+        for name in options:
+            if name not in known:
+                raise unknown_name("option", name, known)
+        return cls(**options)
 
     def control(self, seed: int = 0) -> ControlConfig:
         """Return the settings of `sainet control` with the same trials."""

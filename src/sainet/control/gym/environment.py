@@ -55,13 +55,14 @@ class PushDisks(gymnasium.Env[Observation, Action]):
             options: fields of `PushDisksConfig`.
 
         Raises:
+            UnknownName: there is no option of a name.
             BadSetting: an option has a value that cannot be used.
             MissingExtra: the world needs a package that is not installed.
         """
         if render_mode is not None:
             require_one_of("render_mode", render_mode, _RENDER_MODES)
         self.render_mode = render_mode
-        self.config = PushDisksConfig(**options)
+        self.config = PushDisksConfig.of(**options)
         control = self.config.control()
         actions = ACTIONS[self.config.actions]()
         self.task = PushDisksTask(make_trial(control, 0).scene, actions, control)

@@ -4,27 +4,32 @@ from abc import ABC, abstractmethod
 
 from sainet.control.gym.actions import Action
 from sainet.control.gym.task import Observation, PushDisksTask
-from sainet.models.library import Model
+from sainet.models.library import Loadable, as_model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner, Plan
+from sainet.runs.errors import require
 from sainet.scenes.scene import TIME_STEP
 
 
 class AbstractPolicy(ABC):
     """A model that plans for an environment, with ``act(observation) -> action``."""
 
-    def __init__(self, model: Model, task: PushDisksTask) -> None:
+    def __init__(self, model: Loadable, task: PushDisksTask) -> None:
         """Check that the model is for such pushes.
 
         Args:
-            model: predicts, for example `load_model("sain")`.
+            model: predicts; a model, its name or its folder, as `load` takes it.
             task: of the environment, ``env.unwrapped.task``.
 
         Raises:
+            UnknownName: there is no model of this name.
             BadCheckpoint: the network is for other pushes.
+            BadSetting: the task is none, but the environment for example.
         """
-        model.check_fits("robot", TIME_STEP)
-        self.model = model
+        is_task = isinstance(task, PushDisksTask)  # pyright: ignore
+        require(is_task, "task", "that of an environment, env.unwrapped.task", task)
+        self.model = as_model(model)
+        self.model.check_fits("robot", TIME_STEP)
         self.task = task
 
     @property

@@ -19,10 +19,11 @@ from sainet.control.gym.spaces import (
 from sainet.control.gym.tables import Tables
 from sainet.control.gym.task import Observation, PushDisksTask, observation_of
 from sainet.control.trial import make_trial
-from sainet.runs.errors import BadInput, BadSetting
+from sainet.runs.errors import BadInput, BadSetting, require
 from sainet.scenes.quantities import LARGEST_COUNT, require_count
 
 _MOST = 1_000_000  # environments
+_SINGLE = "if `vectorization_mode` is not 'sync' or 'async'"
 _Each = Bool[np.ndarray, " env"]
 _Infos = dict[str, np.ndarray]
 
@@ -50,13 +51,15 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
             options: fields of `PushDisksConfig`; the world has to be planar.
 
         Raises:
+            UnknownName: there is no option of a name.
             BadSetting: an option has a value that cannot be used.
         """
         require_count("num_envs", num_envs, high=_MOST)
-        self.config = PushDisksConfig(**options)
+        mode = options.pop("render_mode", None)
+        require(mode is None, "render_mode", f"None {_SINGLE}", mode)
+        self.config = PushDisksConfig.of(**options)
         if self.config.world != "planar":
-            wanted = "planar if `vectorization_mode` is not 'sync' or 'async'"
-            raise BadSetting("world", self.config.world, wanted)
+            raise BadSetting("world", self.config.world, f"planar {_SINGLE}")
         control = self.config.control()
         actions = ACTIONS[self.config.actions]()
         self.task = PushDisksTask(make_trial(control, 0).scene, actions, control)
