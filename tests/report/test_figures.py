@@ -15,7 +15,7 @@ from sainet.report.figures.canvas import spread
 from sainet.report.figures.curves import draw_learning_curve, running_mean
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages import read
-from sainet.report.palette import css_variables, style_of, styles_of
+from sainet.report.palette import css_variables, labels_of, style_of, styles_of
 
 HOSTILE = "<script>alert(1)</script> $x_{"
 
@@ -162,6 +162,16 @@ def test_a_running_mean_averages_neighbouring_losses(tmp_path):
     losses = np.random.default_rng(0).lognormal(size=60)
     assert running_mean(losses)[30] == pytest.approx(losses[27:33].mean())
     assert running_mean(losses[:5]).tolist() == losses[:5].tolist()  # too few
+
+
+def test_a_computed_label_is_whole_and_a_long_given_name_keeps_its_end():
+    simulator = SIMULATORS["bullet"]
+    features = "letter-push-frame"
+    one = ModelId(kind="sain", simulator=simulator, features=features)
+    other = ModelId(kind="published", name="runs/" + "x" * 50 + "/end")
+    labels = labels_of([one, other])
+    assert labels[one.slug] == one.label
+    assert labels[other.slug][0] == "…" and labels[other.slug][-4:] == "/end"
 
 
 def test_a_legend_names_only_the_curves_that_are_drawn(tmp_path):

@@ -23,7 +23,7 @@ _EPISODE = {
     "--other": (OTHER, "#9aa0a6"),
     "--target": (TARGET, "#d9b40a"),
 }
-_LONGEST = 40  # characters of a label; a longer name, such as a folder, keeps its end
+_LONGEST = 40  # characters; a longer given name, such as a folder, keeps its end
 
 
 @dataclass(frozen=True)
@@ -117,9 +117,9 @@ def _spare_style(name: str, label: str, taken: set[int]) -> ModelStyle:
 
 
 def labels_of(models: Iterable[ModelId]) -> dict[str, str]:
-    """Return the label of each model by its slug."""
-    return {model.slug: _shortened(model.label) for model in models}
+    """Return the label of each model by its slug; a given name may be shortened."""
+    return {m.slug: _shortened(m.name) if m.name else m.label for m in models}
 
 
-def _shortened(label: str) -> str:
-    return label if len(label) <= _LONGEST else f"…{label[1 - _LONGEST :]}"
+def _shortened(name: str) -> str:
+    return name if len(name) <= _LONGEST else f"…{name[1 - _LONGEST :]}"
