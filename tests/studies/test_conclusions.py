@@ -2,12 +2,14 @@
 
 from itertools import groupby
 
-from sainet.evaluation.claims import Claim, Verdict, solves_more
+from sainet.evaluation.claims import Claim, Verdict, errs_less, solves_more
 from sainet.evaluation.rulings import rule_on
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow
-from sainet.studies import STUDIES
+from sainet.studies import STUDIES, load_study
 from sainet.studies.conclusions import CLAIMS, HEADINGS, PaperClaim, conclude, rows_of
+from sainet.studies.evidence import Evidence
+from support import REPOSITORY
 
 NOTHING = Summary(models=())
 
@@ -44,6 +46,29 @@ def test_claims_of_one_study_are_corrected_together():
     ]
     for row in rows_of(conclude(lambda study: NOTHING, claims)):
         assert len(row) == len(HEADINGS)
+
+
+def test_a_claim_that_a_study_states_has_one_verdict_everywhere():
+    evidence = Evidence(REPOSITORY)
+    study = load_study("varied-or-fixed")
+    ruled = rule_on(study.claims, evidence.summary("varied-or-fixed"))
+    (stated,) = (each for each in ruled if each.p is not None)
+    wanted = f"{stated.status} (p {stated.p:.2g})"
+    claims = [each for each in CLAIMS if each.study == "varied-or-fixed"]
+    (found,) = conclude(evidence.find, claims)
+    assert found.assumed == wanted
+    # Another claim is corrected for the number of both, and changes no ruling.
+    added = PaperClaim("text", "where", "varied-or-fixed", errs_less("in", "physics"))
+    found, _ = conclude(evidence.find, [*claims, added])
+    assert found.assumed == wanted
+
+
+def test_rules_with_equal_arguments_are_equal():
+    assert (
+        errs_less("a", "b") == errs_less("a", "b", condition="") != errs_less("b", "a")
+    )
+    assert solves_more("a", "b", "hard") == solves_more("a", "b", "hard")
+    assert solves_more("a", "b", "hard") != solves_more("a", "b", "easy")
 
 
 def test_a_comparison_of_solved_goals_that_fails_counts_as_tested():

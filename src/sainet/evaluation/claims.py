@@ -80,18 +80,16 @@ PUBLISHED_ORDER = Claim(
 )
 
 
-def errs_less(
-    model: str,
-    against: str,
-    *,
-    condition: str = "",
-    metrics: Sequence[str] = ("pos_mm", "rot_deg"),
-) -> Rule:
-    """Return the rule that a model errs less: every interval lies below zero."""
+@dataclass(frozen=True)
+class _ErrsLess:
+    model: str
+    against: str
+    condition: str
+    metrics: tuple[str, ...]
 
-    def rule(summary: Summary) -> Verdict:
-        pairs = compared(summary, model, against, condition)
-        found = tuple(each for each in pairs if each.metric in metrics)
+    def __call__(self, summary: Summary) -> Verdict:
+        pairs = compared(summary, self.model, self.against, self.condition)
+        found = tuple(each for each in pairs if each.metric in self.metrics)
         if not found or any(each.difference.low is None for each in found):
             return Verdict("not testable here", found)
         wrong = tuple(each for each in found if sign(each) >= 0)
@@ -100,28 +98,49 @@ def errs_less(
         p = max(known) if not wrong and len(known) == len(found) else None
         return Verdict("does not hold" if wrong else "holds", found, wrong, p)
 
-    return rule
+
+def errs_less(
+    model: str,
+    against: str,
+    *,
+    condition: str = "",
+    metrics: Sequence[str] = ("pos_mm", "rot_deg"),
+) -> Rule:
+    """Return the rule that a model errs less: every interval lies below zero.
+
+    Rules with equal arguments are equal: one test, wherever it is asked for.
+    """
+    return _ErrsLess(model, against, condition, tuple(metrics))
 
 
-def solves_more(model: str, against: str, condition: str) -> Rule:
-    """Return the rule that a model solves more goals, by more than chance."""
+@dataclass(frozen=True)
+class _SolvesMore:
+    model: str
+    against: str
+    condition: str
 
-    def rule(summary: Summary) -> Verdict:
-        rows = [each for each in summary.trials if each.condition == condition]
-        if not {model, against} <= {row.model for row in rows}:
+    def __call__(self, summary: Summary) -> Verdict:
+        rows = [each for each in summary.trials if each.condition == self.condition]
+        if not {self.model, self.against} <= {row.model for row in rows}:
             return Verdict("not testable here")
-        found = rank_models(summary, condition).better
+        found = rank_models(summary, self.condition).better
         better = {row.model: others for row, others in found}
-        if against not in (row.model for row in better.get(model, ())):
+        if self.against not in (row.model for row in better.get(self.model, ())):
             return Verdict("does not hold")
         (p,) = (
             test.p
-            for test in _tests_of_solved(summary, condition)
-            if {test.model, test.against} == {model, against}
+            for test in _tests_of_solved(summary, self.condition)
+            if {test.model, test.against} == {self.model, self.against}
         )
         return Verdict("holds", p=p)
 
-    return rule
+
+def solves_more(model: str, against: str, condition: str) -> Rule:
+    """Return the rule that a model solves more goals, by more than chance.
+
+    Rules with equal arguments are equal.
+    """
+    return _SolvesMore(model, against, condition)
 
 
 def our_model(published: ModelId, summary: Summary) -> str:

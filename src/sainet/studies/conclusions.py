@@ -2,8 +2,8 @@
 
 Each claim is tested against engines with assumed and, where there is one, with true
 properties. One rule rules on all: a claim holds if every error that it is about is
-clearly smaller, corrected as in `evaluation.rulings`. The list was written after most
-of these studies had been run.
+clearly smaller, corrected as in `evaluation.rulings` together with the claims of its
+study. The list was written after most of these studies had been run.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,6 +13,7 @@ from itertools import groupby
 from sainet.evaluation.claims import Claim, Rule, errs_less, sign, solves_more
 from sainet.evaluation.rulings import Ruled, rule_on
 from sainet.evaluation.summary import BASELINE, Summary
+from sainet.studies import STUDIES, load_study
 from sainet.studies.lab_control import BY_SLOT, HARD, ON_PLYWOOD, SWAPPED, solves_share
 from sainet.studies.lab_prediction import IN_TUNED, SAIN_TUNED, TESTS
 from sainet.studies.paper_setup import SAIN, SAIN_BULLET, SAIN_TRUE
@@ -190,6 +191,9 @@ def conclude(
 ) -> tuple[Conclusion, ...]:
     """Return every claim with its rulings, the claims of a study corrected together.
 
+    A claim that the study itself states has the ruling of the study. The others were
+    added later, and are corrected for the number of both.
+
     Args:
         find: returns the summary of a study; None: the study was not run.
         claims: those of one study stand together.
@@ -208,14 +212,16 @@ def _of_study(
             word = NOT_RUN if claim.study else NOT_TESTABLE
             yield Conclusion(claim, word, word if claim.true else "")
         return
-    rules = [[rule for rule in (c.assumed, c.true) if rule] for c in claims]
-    tested = [
-        Claim(c.text, r) for c, own in zip(claims, rules, strict=True) for r in own
-    ]
-    rulings = iter(rule_on(tested, summary))
-    for claim, own in zip(claims, rules, strict=True):
-        words = [_word(next(rulings)) for _ in own]
-        yield Conclusion(claim, words[0], words[1] if claim.true else "")
+    study = claims[0].study
+    own = load_study(study).claims if study in STUDIES else ()
+    rules = [rule for c in claims for rule in (c.assumed, c.true) if rule]
+    stated = {claim.rule for claim in own}
+    added = [Claim(study, rule) for rule in rules if rule not in stated]
+    every = (*rule_on([*own, *added], summary)[len(own) :], *rule_on(own, summary))
+    words = {ruled.claim.rule: _word(ruled) for ruled in every}
+    for claim in claims:
+        two = (words[r] if r else "" for r in (claim.assumed, claim.true))
+        yield Conclusion(claim, *two)
 
 
 def _word(ruled: Ruled) -> str:
