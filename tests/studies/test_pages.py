@@ -13,7 +13,7 @@ from sainet.runs.errors import BadInput
 from sainet.runs.manifest import MANIFEST, manifest
 from sainet.studies import STUDIES, load_study
 from sainet.studies.evidence import Evidence, keep
-from sainet.studies.pages import BEGIN, END, TEMPLATES, rendered, with_block
+from sainet.studies.pages import BEGIN, END, TEMPLATES, rendered, verdict, with_block
 from sainet.studies.study import ENGINE_ERRORS, MEASUREMENTS
 from support import REPOSITORY
 
@@ -78,21 +78,38 @@ def test_a_text_without_a_place_for_its_block_is_refused():
 def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
     for name in ("results", TEMPLATES):
         (tmp_path / name).mkdir(parents=True)
-    for name in ("readme-block", "benchmarks"):
-        text = (
-            "{% set title = 'Timings' %}{{ bench('training') }}"
-            if name == "benchmarks"
-            else name
-        )
+    titles = (
+        "{% for name, title in titles.items() %}{{ name }}: {{ title }}\n{% endfor %}"
+    )
+    templates = {
+        "readme-block": "readme-block",
+        "benchmarks": "{% set title = 'Timings' %}"
+        "{{ bench('training', {'iteration_ms': 'one iteration (ms)'}) }}",
+        "findings": "{% set title = 'Findings' %}{{ findings }}",
+        "index": titles + "By hand: {{ transcribed | join }}",
+    }
+    for name, text in templates.items():
         (tmp_path / TEMPLATES / f"{name}.md.j2").write_text(text)
-    index = "{% for name, title in titles.items() %}{{ name }}: {{ title }}{% endfor %}"
-    (tmp_path / TEMPLATES / "index.md.j2").write_text(index)
     shutil.copy(REPOSITORY / "results" / "bench-training.json", tmp_path / "results")
     (tmp_path / "README.md").write_text(f"{BEGIN}{END}")
     pages = {path.name: text for path, text in rendered(tmp_path).items()}
     assert pages["README.md"] == f"{BEGIN}readme-block\n{END}"
-    assert "| `devices` |" in pages["benchmarks.md"]
-    assert pages["index.md"] == "benchmarks.md: Timings\n"
+    rows = pages["benchmarks.md"].splitlines()
+    assert rows.index("| one iteration (ms) | 91.68 |") < rows.index(
+        "| `devices` | 2 |"
+    )
+    assert not any("None" in row for row in rows)
+    assert pages["index.md"] == (
+        "benchmarks.md: Timings\nfindings.md: Findings\nBy hand: benchmarks.md\n"
+    )
+
+
+def test_a_verdict_is_of_a_claim_that_the_study_states():
+    study, (claim, *_) = "varied-or-fixed", load_study("varied-or-fixed").claims
+    summary = Evidence(REPOSITORY).summary(study)
+    assert verdict(study, claim.text, summary) == "**does not hold**"
+    with pytest.raises(ValueError, match="unpack"):
+        verdict(study, "another claim", summary)
 
 
 def test_a_page_states_every_claim_of_its_study():

@@ -63,7 +63,8 @@ def arrange(summary: Summary) -> Table:
         columns=columns,
         lines=tuple(_mark_best(every, lines, metrics)),
         published=tuple(_line(v, metrics, bodies, labels, "") for v in theirs),
-        sentences=(*notes, *comparisons(summary, {v.model.slug for v in every})),
+        notes=tuple(notes),
+        sentences=tuple(comparisons(summary, {v.model.slug for v in every})),
         verdicts=verdicts_on(summary),
     )
 

@@ -61,7 +61,8 @@ class Table:
     columns: tuple[Column, ...]
     lines: tuple[Line, ...]
     published: tuple[Line, ...] = ()
-    sentences: tuple[str, ...] = ()  # comparisons, and lines left out
+    notes: tuple[str, ...] = ()  # on lines that are left out
+    sentences: tuple[str, ...] = ()  # comparisons
     verdicts: tuple[str, ...] = ()
     samples: str = "Pushes"
     note: str = NOTE

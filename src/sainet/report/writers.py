@@ -37,7 +37,7 @@ def print_table(table: Table, console: Console) -> None:
         wide = _drawn(block, is_compact=False)
         fits = console.measure(wide, options=unbounded).maximum <= console.width
         console.print(wide if fits else _drawn(block, is_compact=True))
-    for sentence in (*table.sentences, *table.verdicts):
+    for sentence in (*table.notes, *table.sentences, *table.verdicts):
         console.print(Text(sentence))
 
 
@@ -174,7 +174,7 @@ def to_markdown(table: Table) -> str:
                 + [_markdown(table.present_of(line, c), mark) for c in table.columns]
             )
     text = "\n".join("| " + " | ".join(row) + " |" for row in rows)
-    below = [f"- {_plain(sentence)}" for sentence in table.sentences]
+    below = [f"- {_plain(each)}" for each in (*table.notes, *table.sentences)]
     parts = [text, _note(table), "\n".join(below)]
     parts += [f"**{_plain(verdict)}**" for verdict in table.verdicts]
     return "\n\n".join(part for part in parts if part) + "\n"

@@ -29,6 +29,7 @@ class Benchmark(msgspec.Struct, frozen=True):
     figures: dict[str, float | str | None]
     machine: str
     note: str = ""
+    transcribed: bool = False  # by hand
 
 
 class Identification(msgspec.Struct, frozen=True):
@@ -63,6 +64,10 @@ class Evidence:
         """Return the summary of a study, or None if no evidence of it is kept."""
         paths = (self.folder / f"{name}{end}" for end in (".nc.xz", ".json"))
         return self.summary(name) if any(p.is_file() for p in paths) else None
+
+    def is_transcribed(self, name: str) -> bool:
+        """Whether the summary of a study was typed, and its measurements are lost."""
+        return not (self.folder / f"{name}.nc.xz").is_file()
 
     def measured(self, name: str) -> Measurements:
         """Return the measurements of a study."""

@@ -9,47 +9,42 @@ or the record of an episode that is drawn. Prose stands in the templates in
 """
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import jinja2
 
-from sainet.evaluation.claims import places
 from sainet.evaluation.coverage import HEADINGS, rows_of
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.rulings import rule_on
-from sainet.evaluation.summary import BASELINE, Summary
-from sainet.report.arrange import arrange
-from sainet.report.palette import labels_of
-from sainet.report.verdicts import beside_published, rulings, worded_places
-from sainet.report.writers import (
-    ESTIMATE_HEADINGS,
-    estimate_cells,
-    estimate_sentences,
-    to_markdown,
-)
+from sainet.evaluation.summary import Summary
+from sainet.report.verdicts import beside_published, rulings
 from sainet.runs.documents import write_bytes
 from sainet.studies import STUDIES, load_study
 from sainet.studies.conclusions import HEADINGS as CLAIM_HEADINGS
 from sainet.studies.conclusions import conclude
 from sainet.studies.conclusions import rows_of as rows_of_claims
-from sainet.studies.evidence import (
-    FIGURES,
-    Benchmark,
-    Evidence,
-    Identification,
-    described,
-    keep,
+from sainet.studies.evidence import FIGURES, Evidence, described, keep
+from sainet.studies.page_parts import (
+    ERRORS,
+    TRANSCRIBED,
+    bench,
+    choices,
+    draw_figures,
+    figure_of,
+    identified,
+    main_table,
+    ratios,
+    slashed,
+    table,
 )
-from sainet.studies.page_figures import draw_figures
 from sainet.studies.recorded_active import saving
-from sainet.studies.study import Choice
 
 TEMPLATES, PAGES = "docs/templates", "docs/results"
 BEGIN, END = "<!-- rendered by make pages -->\n", "<!-- end of rendered text -->"
 _INDEX, _README = "index.md", "readme-block.md"
-_ERRORS = ("pos_mm", "rot_deg")
+_LAST = ("findings.md", _INDEX)  # name other pages, by their titles
 
 
 class Page(NamedTuple):
@@ -62,31 +57,37 @@ class Page(NamedTuple):
 def helpers(evidence: Evidence) -> dict[str, object]:
     """Return the functions that templates call."""
     summary = evidence.summary
+    chosen = lambda name: load_study(name).choose(summary(name))  # noqa: E731
     return {
         "summary": summary,
-        "coverage": lambda name, *labels: _table(
+        "coverage": lambda name, *labels: table(
             HEADINGS, rows_of(evidence.measured(name), labels), align=":--"
         ),
-        "table": lambda name: to_markdown(arrange(summary(name))),
-        "origin": lambda name: origin(summary(name)),
+        "question": lambda name: f"**{load_study(name).question}**",
+        "table": lambda name, *labels: "\n\n".join(
+            filter(
+                None, [figure_of(name, evidence), main_table(summary(name), *labels)]
+            )
+        ),
+        "plot": lambda name: figure_of(name, evidence),
+        "origin": lambda name: origin(name, evidence),
         "claims": lambda name: "\n\n".join(
             rulings(load_study(name).claims, summary(name))
         ),
-        "conclusions": lambda: _table(
-            CLAIM_HEADINGS, rows_of_claims(conclude(evidence.find)), align=":--"
-        ),
-        "choose": lambda name: load_study(name).choose(summary(name)),
-        "choices": lambda name: choices(load_study(name).choose(summary(name))),
+        "verdict": lambda name, text: verdict(name, text, summary(name)),
+        "paper_verdict": lambda text: paper_verdict(text, evidence),
+        "conclusions": lambda *of: conclusions(evidence, *of),
+        "choose": chosen,
+        "choices": lambda name, *most: choices(chosen(name), *most),
         "ratios": lambda name: ratios(summary(name)),
         "beside_paper": lambda name: beside_published(summary(name)),
-        "readings": lambda name: readings(summary(name)),
         "trainings": lambda name: trainings(summary(name)),
         "errors": lambda name, *which: errors(summary(name), *which),
         "saving": lambda metric: saving(evidence.measured("recorded-active"), metric),
         "solved": solved,
         "travel": lambda name, *where: travel(evidence.measured(name), *where),
         "identified": lambda: identified(evidence.identifications()),
-        "bench": lambda case: bench(evidence.benchmark(case)),
+        "bench": lambda case, names: bench(evidence.benchmark(case), names),
         "figure": lambda case, name: evidence.benchmark(case).figures[name],
     }
 
@@ -100,7 +101,7 @@ def trainings(summary: Summary) -> str:
 
 
 def errors(
-    summary: Summary, model: str, metrics: Sequence[str] = _ERRORS, where: str = ""
+    summary: Summary, model: str, metrics: Sequence[str] = ERRORS, where: str = ""
 ) -> list[str]:
     """Return the errors of a model, disks apart: one text for each metric."""
     return [slashed(summary.errors(model, key, where)) for key in metrics]
@@ -120,24 +121,54 @@ def solved(summary: Summary, condition: str, model: str) -> str:
     return f"{row.solved} of {row.trials}"
 
 
-def choices(tried: Sequence[Choice]) -> str:
-    """Return the settings that a study tried, with their scores, as a table."""
-    return _table(tried[0].cells, (each.cells.values() for each in tried))
+def origin(name: str, evidence: Evidence) -> str:
+    """Return the files of the complete tables, the command and the machine.
 
+    The site links the names of files, which are made when it is built.
 
-def slashed(values: Sequence[float]) -> str:
-    """Return values disk by disk: ``0.64 / 0.54``."""
-    return " / ".join(f"{value:.2f}" for value in values)
-
-
-def origin(summary: Summary) -> str:
-    """Return the command, the note and the machine of a summary, in a paragraph."""
-    source = summary.provenance
+    Args:
+        name: of a study, or of other measurements.
+        evidence: of the studies.
+    """
+    summary = evidence.summary(name)
+    source, pairs = summary.provenance, len(summary.comparisons) + len(summary.tests)
+    compared = f" and all {pairs:,} comparisons" if pairs else ""
+    files = f"`tables/{name}.html`, to sort, and `tables/{name}.csv`"
     words = " ".join(source.command)
-    parts = [f"`{words}`." if words else "", source.note]
-    if source.manifest:
-        parts.append(f"Machine: {described(source.manifest)}.")
-    return " ".join(part for part in parts if part)
+    parts = [
+        f"Every number{compared}: {files}, made by `make docs`.",
+        f"Command: `{words}`." if words else "",
+        TRANSCRIBED if evidence.is_transcribed(name) else "",
+        source.note,
+        f"Machine: {described(source.manifest)}." if source.manifest else "",
+    ]
+    return " ".join(filter(None, parts))
+
+
+def verdict(name: str, text: str, summary: Summary) -> str:
+    """Return the ruling on the claim of a study that has this text.
+
+    Args:
+        name: of the study.
+        text: of the claim.
+        summary: of the measurements of the study.
+    """
+    ruled = rule_on(load_study(name).claims, summary)
+    (found,) = (each for each in ruled if each.claim.text == text)
+    return f"**{found.status}**" + (f" (p {found.p:.2g})" if found.p else "")
+
+
+def paper_verdict(text: str, evidence: Evidence) -> str:
+    """Return the ruling on the claim of the paper that has this text."""
+    found = conclude(evidence.find)
+    return next(f"**{each.assumed}**" for each in found if each.claim.text == text)
+
+
+def conclusions(evidence: Evidence, study: str | None = None) -> str:
+    """Return the claims of the paper, all or those that a study tests, as a table."""
+    found = conclude(evidence.find)
+    shown = [each for each in found if study in (None, each.claim.study)]
+    return table(CLAIM_HEADINGS, rows_of_claims(shown), align=":--")
 
 
 def findings(evidence: Evidence, titles: Mapping[str, str]) -> str:
@@ -155,73 +186,7 @@ def findings(evidence: Evidence, titles: Mapping[str, str]) -> str:
         for each in rule_on(claims, summary):
             p = "" if each.p is None else f"{each.p:.2g}"
             rows.append((each.claim.text, f"**{each.status}**", p, page))
-    return _table(("claim", "verdict", "p", "page"), rows, align=":--")
-
-
-def _table(
-    head: Iterable[str], rows: Iterable[Iterable[str]], *, align: str = "--:"
-) -> str:
-    """Return a table as Markdown, its first column on the left."""
-    head = list(head)
-    lines = (head, (":--", *[align] * (len(head) - 1)), *rows)
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def ratios(summary: Summary) -> str:
-    """Return tables of errors over those of physics, disk by disk."""
-    labels = labels_of(summary.models)
-    slugs = dict.fromkeys(row.model for row in summary.rows if row.model != BASELINE)
-    parts = []
-    for key, name in zip(_ERRORS, ("Position", "Rotation"), strict=True):
-        head = [f"{name} error over that of Physics", *(labels[slug] for slug in slugs)]
-        lines: list[list[str]] = []
-        for condition in summary.conditions:
-            below = summary.errors(BASELINE, key, condition.label)
-            cells = [
-                slashed([a / b for a, b in zip(above, below, strict=True)])
-                if (above := summary.errors(slug, key, condition.label))
-                else "–"  # noqa: RUF001
-                for slug in slugs
-            ]
-            lines.append([condition.label or "all", *cells])
-        parts.append(_table(head, lines))
-    return "\n\n".join(parts)
-
-
-def readings(summary: Summary) -> str:
-    """Return where every SAIN is better or worse than true-property physics and IN."""
-    sains = [m.slug for m in summary.models if m.kind == "sain"]
-    lines = []
-    for condition in summary.conditions:
-        where = f"*{condition.label}*: " if condition.label else ""
-        for model in sains:
-            for against in ("physics-true", "in"):
-                found = places(
-                    summary, model, against, metrics=_ERRORS, condition=condition.label
-                )
-                lines.append(f"- {where}{worded_places(found, summary)}")
-    return "\n".join(lines)
-
-
-def identified(groups: Mapping[str, Identification]) -> str:
-    """Return the parameters identified on each group of pushes, as tables."""
-    machines = dict.fromkeys(described(each.manifest) for each in groups.values())
-    parts = [f"Machine: {machine}." for machine in machines]
-    for group, each in groups.items():
-        rows = map(estimate_cells, each.found.estimates)
-        parts += [f"**{group}**", _table(ESTIMATE_HEADINGS, rows)]
-        parts.append("\n".join(f"- {s}" for s in estimate_sentences(each.found)))
-    return "\n\n".join(parts)
-
-
-def bench(found: Benchmark) -> str:
-    """Return the figures of a benchmark case as a table, below their origin."""
-    rows = (
-        (f"`{name}`", f"{value:.4g}" if isinstance(value, float) else str(value))
-        for name, value in found.figures.items()
-    )
-    note = f"{found.note} " if found.note else ""
-    return f"{note}Machine: {found.machine}\n\n{_table(('figure', 'value'), rows)}"
+    return table(("claim", "verdict", "p", "page"), rows, align=":--")
 
 
 def rendered(root: Path) -> dict[Path, str]:
@@ -240,16 +205,17 @@ def rendered(root: Path) -> dict[Path, str]:
     )
     evidence = Evidence(root)
     environment.globals.update(cast(Any, helpers(evidence)))
-    pages = {
-        path.stem: _page(environment.get_template(path.name))
-        for path in sorted(templates.glob("*.md.j2"))
-        if path.stem != _INDEX
-    }
+    names = [p.stem for p in templates.glob("*.md.j2") if p.stem not in _LAST]
+    pages = {n: _page(environment.get_template(f"{n}.j2")) for n in sorted(names)}
     block = pages.pop(_README)
-    titles = {name: page.title for name, page in pages.items()}
-    table = findings(evidence, {Path(k).stem: v for k, v in titles.items()})
-    index = environment.get_template(f"{_INDEX}.j2")
-    pages[_INDEX] = _page(index, titles=titles, findings=table)
+    for name in _LAST:
+        titles = {name: page.title for name, page in pages.items()}
+        found = findings(evidence, {Path(k).stem: v for k, v in titles.items()})
+        transcribed = [k for k, page in pages.items() if TRANSCRIBED in page.text]
+        template = environment.get_template(f"{name}.j2")
+        pages[name] = _page(
+            template, titles=titles, findings=found, transcribed=transcribed
+        )
     readme = root / "README.md"
     return {root / PAGES / name: page.text for name, page in pages.items()} | {
         readme: with_block(readme.read_text("utf-8"), block.text)

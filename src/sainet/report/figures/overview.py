@@ -20,7 +20,7 @@ from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
 
 _METRIC = "pos_mm"
-_SHARES = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5)
+_SHARES = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2, 3, 5, 7, 10, 20)
 _ROW, _ENDS = 0.19, 0.9  # inches: of a row, and above and below all rows
 
 
@@ -69,6 +69,8 @@ def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
         axes.axvline(1, color=INK, linewidth=0.8)
         axes.set_xlabel("position error over that of physics")
         _draw(axes, sections)
+        # An interval may reach far below every number.
+        axes.set_xlim(left=max(axes.get_xlim()[0], _SHARES[0] / 2))
         return canvas.save(figure, path)
 
 
@@ -91,7 +93,12 @@ def draw_success(parts: Sequence[Part], path: Path) -> Path:
 
 
 def _ratios(part: Part) -> Iterator[Dot]:
-    factors = [f for f in part.summary.factors if f.condition == part.condition]
+    abstaining = {each.slug for each in part.summary.models if each.abstains}
+    factors = [
+        factor
+        for factor in part.summary.factors
+        if factor.condition == part.condition and factor.model not in abstaining
+    ]
     styles = styles_of((f.model for f in factors), part.summary.models)
     published = _published_ratios(part)
     for each in factors:
