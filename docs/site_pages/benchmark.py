@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from sainet.api.benchmark import Track, read_entry, tracks
@@ -31,13 +32,19 @@ class Standing:
         return (_cell(row.values[metric]) for row in self.rows)
 
 
+@cache
+def evidence_of(root: Path) -> Evidence:
+    """Return the evidence of a repository, whose summaries are made once."""
+    return Evidence(root)
+
+
 def rankings(root: Path) -> str:
     """Return the ranking of every track, from what is in results/.
 
     Args:
         root: the repository.
     """
-    evidence, found = Evidence(root), entries(root)
+    evidence, found = evidence_of(root), entries(root)
     parts = []
     for name, track in tracks().items():
         ours: dict[str, Standing] = {}

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from docutils import nodes
@@ -10,7 +11,8 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
 
-from site_pages.benchmark import rankings
+from sainet.studies.pages import PAGES
+from site_pages.benchmark import evidence_of, rankings
 from site_pages.contents import CONTENTS, EXECUTED
 from site_pages.fields import add_fields
 from site_pages.reference import (
@@ -22,6 +24,7 @@ from site_pages.reference import (
     public_homes,
     python_interface,
 )
+from site_pages.tables import NAMED, body, grids, named_tables
 
 _NOTEBOOK = """---
 file_format: mystnb
@@ -74,6 +77,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("doctree-read", _show_commands)
     app.connect("autodoc-process-docstring", add_fields)
     app.connect("autodoc-process-signature", _short_signature)
+    app.connect("html-collect-pages", _complete_tables)
     app.connect("build-finished", _refuse_remote_parts)
     app.connect("missing-reference", _public_name)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
@@ -95,7 +99,24 @@ def _prepare(app: Sphinx, page: str, source: list[str]) -> None:
         text += _toctree(
             sorted(p.stem for p in folder.glob("*.md") if p.stem != "index")
         )
+    if page.startswith("results/"):
+        text = NAMED.sub(
+            lambda file: f'<a href="{file[0][1:-1]}">{file[0][1:-1]}</a>', text
+        )
     source[0] = text
+
+
+def _complete_tables(app: Sphinx) -> Iterator[tuple[str, dict[str, str], str]]:
+    """Write the complete tables as CSV, and yield the pages on which they sort."""
+    folder = Path(app.outdir, Path(PAGES).name, "tables")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, (page, title) in named_tables(Path(app.srcdir)).items():
+        summary = evidence_of(ROOT).summary(name)
+        for grid in grids(name, summary):
+            (folder / f"{name}{grid.suffix}.csv").write_text(grid.to_csv(), "utf-8")
+        text = body(name, page, title, summary)
+        shown = {"title": f"Every number: {title}", "body": text}
+        yield f"{Path(PAGES).name}/tables/{name}", shown, "page.html"
 
 
 def _as_text(link: re.Match[str]) -> str:

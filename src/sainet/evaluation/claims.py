@@ -209,6 +209,32 @@ def sign(comparison: Comparison) -> int:
 
 
 @dataclass(frozen=True)
+class Places:
+    """The errors in which one model is better or worse than another."""
+
+    model: str
+    against: str
+    better: tuple[Comparison, ...]
+    worse: tuple[Comparison, ...]
+
+
+def places(
+    summary: Summary,
+    model: str,
+    against: str,
+    *,
+    metrics: Sequence[str],
+    condition: str = "",
+) -> Places:
+    """Return where the interval of the paired difference leaves out zero."""
+    pairs = compared(summary, model, against, condition)
+    found = [each for each in pairs if each.metric in metrics]
+    better = tuple(each for each in found if sign(each) < 0)
+    worse = tuple(each for each in found if sign(each) > 0)
+    return Places(model, against, better, worse)
+
+
+@dataclass(frozen=True)
 class Comparative:
     """The best network of a condition beside the physics engine."""
 

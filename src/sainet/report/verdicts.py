@@ -6,6 +6,7 @@ from sainet.evaluation.claims import (
     CHANCE,
     TRUE_PROPERTIES,
     Claim,
+    Places,
     best_network,
     over_published,
     rank_models,
@@ -134,6 +135,18 @@ def _is_reported(test: TrialTest) -> bool:
     if test.measure == "solved":
         return bool(test.only_one or test.only_other)
     return test.p < CHANCE
+
+
+def worded_places(found: Places, summary: Summary) -> str:
+    """Return in which errors a model is better or worse than another."""
+    labels = labels_of(summary.models)
+    return _worded(
+        "places",
+        labels=labels,
+        places=found,
+        better=_where(found.better),
+        worse=_where(found.worse),
+    )
 
 
 def _where(found: Sequence[Comparison]) -> str:
