@@ -49,6 +49,7 @@ _GENERATED = {
     "contributing": lambda: project_file("CONTRIBUTING.md"),
     "models": model_zoo,
 }
+_PAGE = re.compile(r"\]\(([\w-]+)\.md\)")  # beside a page
 _PLACE = "<!-- generated -->"  # of the generated text; else it comes last
 # A cell that runs commands. A kernel's own magic colours outputs and breaks lines.
 _SHELL = "commands = "
@@ -94,11 +95,11 @@ def _prepare(app: Sphinx, page: str, source: list[str]) -> None:
         text = _NOTEBOOK + _BLOCK.sub(_cell, text)
     if page == app.config.root_doc:
         text += "".join(_toctree(pages, name) for name, pages in CONTENTS.items())
-    if page == "results/index":
-        folder = Path(app.srcdir, "results")
-        text += _toctree(
-            sorted(p.stem for p in folder.glob("*.md") if p.stem != "index")
-        )
+    if page == "results/index":  # in the order of its list
+        pages = Path(app.srcdir, "results").glob("*.md")
+        listed = _PAGE.findall(text.partition("## Pages")[2])
+        names = dict.fromkeys([*listed, *sorted(path.stem for path in pages)])
+        text += _toctree([name for name in names if name != "index"])
     if page.startswith("results/"):
         text = NAMED.sub(
             lambda file: f'<a href="{file[0][1:-1]}">{file[0][1:-1]}</a>', text

@@ -8,7 +8,8 @@ import html
 import io
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 from sainet.evaluation.intervals import Estimate
@@ -116,7 +117,8 @@ def _raw(value: float | None) -> str:
 def _shown(value: float | None, column: Column) -> str:
     if value is None:
         return ""
-    return str(value) if isinstance(value, int) else f"{value:.{column.digits}f}"
+    text = str(value) if isinstance(value, int) else f"{value:.{column.digits}f}"
+    return text.replace("-", "−")  # noqa: RUF001
 
 
 def named_tables(folder: Path) -> dict[str, tuple[str, str]]:
@@ -173,7 +175,17 @@ def grids(name: str, summary: Summary) -> Iterator[Grid]:
         _differences(summary, labels),
         _choices(name, summary),
     )
-    yield from (grid for grid in every if grid.rows)
+    yield from (_without_empty(grid) for grid in every if grid.rows)
+
+
+def _without_empty(grid: Grid) -> Grid:
+    """Return a table without the columns that are empty in each row."""
+    filled = [
+        any(value not in ("", None) for value in c)
+        for c in zip(*grid.rows, strict=True)
+    ]
+    rows = [list(compress(row, filled)) for row in grid.rows]
+    return replace(grid, columns=list(compress(grid.columns, filled)), rows=rows)
 
 
 def _errors(summary: Summary) -> Grid:
