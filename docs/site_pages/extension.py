@@ -40,6 +40,9 @@ language_info:
 _BLOCK = re.compile(r"^```(python|bash)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # Folders, and files that are no pages: GitHub shows them, the site has no copy.
 _NO_PAGE = re.compile(r"\[([^\]\n]+)\]\((?:\.\./)+(?!figures|results/\w)[^)#]*\)")
+# The same on pages of results, which link the pages above them.
+_NO_PAGE_BELOW = re.compile(r"\[([^\]\n]+)\]\((?:\.\./){2,}[^)#]*\)")
+_RESULTS = "results/"
 _GENERATED = {
     "api": python_interface,
     "benchmark": lambda: rankings(ROOT),
@@ -86,7 +89,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
 
 def _prepare(app: Sphinx, page: str, source: list[str]) -> None:
     """Add to a page what GitHub does not show: contents, and cells that run."""
-    text = _NO_PAGE.sub(_as_text, source[0])
+    no_page = _NO_PAGE_BELOW if page.startswith(_RESULTS) else _NO_PAGE
+    text = no_page.sub(_as_text, source[0])
     if page in _GENERATED:
         generated = _NO_PAGE.sub(_as_text, _GENERATED[page]())
         before, _, after = text.partition(_PLACE)
@@ -100,7 +104,7 @@ def _prepare(app: Sphinx, page: str, source: list[str]) -> None:
         listed = _PAGE.findall(text.partition("## Pages")[2])
         names = dict.fromkeys([*listed, *sorted(path.stem for path in pages)])
         text += _toctree([name for name in names if name != "index"])
-    if page.startswith("results/"):
+    if page.startswith(_RESULTS):
         text = NAMED.sub(
             lambda file: f'<a href="{file[0][1:-1]}">{file[0][1:-1]}</a>', text
         )

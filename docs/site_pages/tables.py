@@ -29,7 +29,7 @@ class Column:
     """A quantity, or what it is of."""
 
     heading: str
-    digits: int = 3  # after the point, on the page; the CSV has six in all
+    digits: int = 3  # of estimates after the point, on the page; the CSV has six in all
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,8 @@ def _cell(value: Value, column: Column) -> str:
         text = f"{_shown(value.value, column)}{small}"
         return f'<td data-value="{_raw(value.value)}">{text}</td>'
     if isinstance(value, int | float):
-        return f'<td data-value="{_raw(value)}">{_shown(value, column)}</td>'
+        text = str(value) if isinstance(value, int) else f"{value:.3g}"
+        return f'<td data-value="{_raw(value)}">{text}</td>'
     return f"<td>{html.escape(value or '')}</td>"
 
 
@@ -117,8 +118,7 @@ def _raw(value: float | None) -> str:
 def _shown(value: float | None, column: Column) -> str:
     if value is None:
         return ""
-    text = str(value) if isinstance(value, int) else f"{value:.{column.digits}f}"
-    return text.replace("-", "−")  # noqa: RUF001
+    return f"{value:.{column.digits}f}".replace("-", "−")  # noqa: RUF001
 
 
 def named_tables(folder: Path) -> dict[str, tuple[str, str]]:
@@ -150,13 +150,14 @@ def body(name: str, page: str, title: str, summary: Summary) -> str:
         f"<h1>Every number: {html.escape(title)}</h1>\n"
         f'<p>Of the page <a href="../{page}.html">{html.escape(title)}</a>. A heading '
         "sorts its column, a second time the other way round.</p>\n"
-        f"{verdicts}"
         '<p><label>Rows that contain <input type="search" class="filter"></label></p>\n'
     ]
     for grid in grids(name, summary):
         file = f"{name}{grid.suffix}.csv"
         parts.append(f'{grid.to_html()}<p><a href="{file}" download>{file}</a></p>\n')
-    return "".join(parts) + '<script src="../../_static/sort.js"></script>\n'
+    return (
+        "".join([*parts, verdicts]) + '<script src="../../_static/sort.js"></script>\n'
+    )
 
 
 def grids(name: str, summary: Summary) -> Iterator[Grid]:
@@ -288,7 +289,7 @@ def _tests(summary: Summary, labels: dict[str, str]) -> Grid:
         ]
         for each in summary.tests
     ]
-    columns = [*map(Column, (*headings, "only the other")), Column("p", 4)]
+    columns = [*map(Column, (*headings, "only the other", "p"))]
     return Grid("-tests", "Exact McNemar tests on the same goals", columns, rows)
 
 

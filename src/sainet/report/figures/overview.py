@@ -62,12 +62,11 @@ def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
     with canvas.house_look():
         figure = canvas.new_figure(7.6, _height(sections))
         axes = figure.subplots()
-        axes.set_xscale("log")
+        axes.set(xscale="log", xlabel="position error over that of physics")
         axes.xaxis.set_major_locator(FixedLocator(_SHARES))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
         axes.axvline(1, color=INK, linewidth=0.8)
-        axes.set_xlabel("position error over that of physics")
         _draw(axes, sections)
         # An interval may reach far below every number.
         axes.set_xlim(left=max(axes.get_xlim()[0], _SHARES[0] / 2))
@@ -85,25 +84,20 @@ def draw_success(parts: Sequence[Part], path: Path) -> Path:
     with canvas.house_look():
         figure = canvas.new_figure(7.6, _height(sections))
         axes = figure.subplots()
-        axes.set_xlim(0, 1.02)
+        axes.set(xlim=(0, 1.02), xlabel="goals solved")
         axes.xaxis.set_major_formatter(PercentFormatter(1))
-        axes.set_xlabel("goals solved")
         _draw(axes, sections)
         return canvas.save(figure, path)
 
 
 def _ratios(part: Part) -> Iterator[Dot]:
-    abstaining = {each.slug for each in part.summary.models if each.abstains}
-    factors = [
-        factor
-        for factor in part.summary.factors
-        if factor.condition == part.condition and factor.model not in abstaining
-    ]
+    factors = [f for f in part.summary.factors if f.condition == part.condition]
+    hidden = {BASELINE, *(each.slug for each in part.summary.models if each.abstains)}
     styles = styles_of((f.model for f in factors), part.summary.models)
     published = _published_ratios(part)
     for each in factors:
         low, high = each.factor.low, each.factor.high
-        if each.model != BASELINE and low and high:
+        if each.model not in hidden and low and high:
             ratio = each.error / each.baseline
             known = published.get(each.model)
             yield Dot(styles[each.model], ratio, 1 / high, 1 / low, known)
