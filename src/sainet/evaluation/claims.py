@@ -80,7 +80,7 @@ PUBLISHED_ORDER = Claim(
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True)  # rules with equal arguments are equal: one test
 class _ErrsLess:
     model: str
     against: str
@@ -106,10 +106,7 @@ def errs_less(
     condition: str = "",
     metrics: Sequence[str] = ("pos_mm", "rot_deg"),
 ) -> Rule:
-    """Return the rule that a model errs less: every interval lies below zero.
-
-    Rules with equal arguments are equal: one test, wherever it is asked for.
-    """
+    """Return the rule that a model errs less: every interval lies below zero."""
     return _ErrsLess(model, against, condition, tuple(metrics))
 
 
@@ -136,10 +133,7 @@ class _SolvesMore:
 
 
 def solves_more(model: str, against: str, condition: str) -> Rule:
-    """Return the rule that a model solves more goals, by more than chance.
-
-    Rules with equal arguments are equal.
-    """
+    """Return the rule that a model solves more goals, by more than chance."""
     return _SolvesMore(model, against, condition)
 
 
