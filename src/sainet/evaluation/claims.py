@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Literal
 
@@ -20,21 +21,13 @@ LEVEL = 1e-3  # relative difference below which two errors are the same
 
 @dataclass(frozen=True)
 class Verdict:
-    """The ruling on a claim.
-
-    Attributes:
-        status: the ruling.
-        comparisons: all comparisons that it rests on.
-        contradicting: those of them that contradict the claim.
-        p: two-sided, that chance alone makes the claim hold; None: the rule has none.
-        is_test: whether chance can make the claim hold, so that it counts where others
-            are corrected for their number.
-    """
+    """The ruling on a claim."""
 
     status: Status
-    comparisons: tuple[Comparison, ...] = ()
-    contradicting: tuple[Comparison, ...] = ()
-    p: float | None = None
+    comparisons: tuple[Comparison, ...] = ()  # all that the verdict rests on
+    contradicting: tuple[Comparison, ...] = ()  # those that contradict the claim
+    p: float | None = None  # two-sided, that chance makes the claim hold, if known
+    # Whether chance can make the claim hold: then it counts where others are corrected.
     is_test: bool = True
 
 
@@ -80,25 +73,6 @@ PUBLISHED_ORDER = Claim(
 )
 
 
-@dataclass(frozen=True)  # rules with equal arguments are equal: one test
-class _ErrsLess:
-    model: str
-    against: str
-    condition: str
-    metrics: tuple[str, ...]
-
-    def __call__(self, summary: Summary) -> Verdict:
-        pairs = compared(summary, self.model, self.against, self.condition)
-        found = tuple(each for each in pairs if each.metric in self.metrics)
-        if not found or any(each.difference.low is None for each in found):
-            return Verdict("not testable here", found)
-        wrong = tuple(each for each in found if sign(each) >= 0)
-        # All must hold: the least certain one decides (an intersection-union test).
-        known = [each.p for each in found if each.p is not None]
-        p = max(known) if not wrong and len(known) == len(found) else None
-        return Verdict("does not hold" if wrong else "holds", found, wrong, p)
-
-
 def errs_less(
     model: str,
     against: str,
@@ -107,34 +81,47 @@ def errs_less(
     metrics: Sequence[str] = ("pos_mm", "rot_deg"),
 ) -> Rule:
     """Return the rule that a model errs less: every interval lies below zero."""
-    return _ErrsLess(model, against, condition, tuple(metrics))
+    return _errs_less(model, against, condition, tuple(metrics))
 
 
-@dataclass(frozen=True)
-class _SolvesMore:
-    model: str
-    against: str
-    condition: str
+@cache  # of equal arguments one rule: a test that two claims ask for is one test
+def _errs_less(
+    model: str, against: str, condition: str, metrics: tuple[str, ...]
+) -> Rule:
+    def rule(summary: Summary) -> Verdict:
+        pairs = compared(summary, model, against, condition)
+        found = tuple(each for each in pairs if each.metric in metrics)
+        if not found or any(each.difference.low is None for each in found):
+            return Verdict("not testable here", found)
+        wrong = tuple(each for each in found if sign(each) >= 0)
+        # All must hold: the least certain one decides (an intersection-union test).
+        known = [each.p for each in found if each.p is not None]
+        p = max(known) if not wrong and len(known) == len(found) else None
+        return Verdict("does not hold" if wrong else "holds", found, wrong, p)
 
-    def __call__(self, summary: Summary) -> Verdict:
-        rows = [each for each in summary.trials if each.condition == self.condition]
-        if not {self.model, self.against} <= {row.model for row in rows}:
+    return rule
+
+
+@cache
+def solves_more(model: str, against: str, condition: str) -> Rule:
+    """Return the rule that a model solves more goals, by more than chance."""
+
+    def rule(summary: Summary) -> Verdict:
+        rows = [each for each in summary.trials if each.condition == condition]
+        if not {model, against} <= {row.model for row in rows}:
             return Verdict("not testable here")
-        found = rank_models(summary, self.condition).better
+        found = rank_models(summary, condition).better
         better = {row.model: others for row, others in found}
-        if self.against not in (row.model for row in better.get(self.model, ())):
+        if against not in (row.model for row in better.get(model, ())):
             return Verdict("does not hold")
         (p,) = (
             test.p
-            for test in _tests_of_solved(summary, self.condition)
-            if {test.model, test.against} == {self.model, self.against}
+            for test in _tests_of_solved(summary, condition)
+            if {test.model, test.against} == {model, against}
         )
         return Verdict("holds", p=p)
 
-
-def solves_more(model: str, against: str, condition: str) -> Rule:
-    """Return the rule that a model solves more goals, by more than chance."""
-    return _SolvesMore(model, against, condition)
+    return rule
 
 
 def our_model(published: ModelId, summary: Summary) -> str:
