@@ -218,6 +218,14 @@ def test_the_readme_names_the_test_command_that_ci_runs():
     assert last.endswith("make test")
 
 
+def test_ci_shows_the_demo_before_it_installs_what_tests_need():
+    lines = (REPOSITORY / ".ci" / "run").read_text().splitlines()
+    steps = [line for line in lines if re.search(r"\bmake [a-z-]+$", line)]
+    quiet = "PYTHONDONTWRITEBYTECODE=1"  # as in many containers; the demo broke there
+    assert steps[:3] == [f"{quiet} make setup", f"{quiet} make demo", "make setup-dev"]
+    assert "set -euo pipefail" in lines  # a step that fails ends the script
+
+
 def test_the_reader_finds_commands():
     text = "```bash\n$ sainet demo  # all\nsainet train \\\n  sain\nmake test\n```\n"
     text += "\n    sainet bench  # all\n"

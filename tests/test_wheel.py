@@ -1,4 +1,4 @@
-"""The wheel, installed where nothing else is: does what people download work?"""
+"""What people download: the wheel works where nothing else is, and so does its page."""
 
 import os
 import re
@@ -6,13 +6,13 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
-from api.programs import PREDICT
+from api.programs import CONTROL, OWN_DATA, PREDICT
+from documents import README, mentions
 from support import REPOSITORY, SOURCE, require
 
 pytestmark = pytest.mark.slow
@@ -31,7 +31,26 @@ print(sainet.__file__)
 """
 
 
-SHOWN = f"{PREDICT}\nprint(trajectory.final.position)"
+# The programs of README.md, the long ones made short as in tests/api/test_programs.py.
+OWN = f"""
+from sainet.learning import recipes
+short = recipes.RESIDUAL.changed(iterations=20)
+recipes.RECIPES[recipes.FromSimulator] = short
+{OWN_DATA}
+"""
+PLANNED = f"""
+import equinox as eqx
+from sainet import PushGrid, make_planner
+from sainet.control.gym import policy
+few = PushGrid(contact_bins=6, direction_bins=3)
+policy.make_planner = lambda name: eqx.tree_at(
+    lambda p: p.actions, make_planner(name), few
+)
+{CONTROL}
+print(terminated, info["is_success"])
+"""
+PYTHONS = ("3.11", "3.12", "3.13")
+RUNNING = "{}.{}".format(*sys.version_info[:2])
 
 
 def run(*command: object, **settings: object) -> subprocess.CompletedProcess[str]:
@@ -50,66 +69,85 @@ def run_well(*command: object, **settings: object) -> str:
     return done.stdout
 
 
-def other_pythons() -> Iterator[Path]:
-    """Interpreters of newer versions, in PATH and in pyenv's folder, that truly run."""
-    for version in ("3.12", "3.13"):
-        shelves = (Path.home() / ".pyenv" / "versions").glob(f"{version}.*/bin/python")
-        named = shutil.which(f"python{version}")
-        for python in [*([Path(named)] if named else []), *sorted(shelves)]:
-            code = "import ensurepip, sys; print('%d.%d' % sys.version_info[:2])"
-            if run(python, "-c", code).stdout.strip() == version:
-                yield python
-
-
-def another_python() -> Path:
-    """A Python of another version than this one; no failure where there is none."""
-    running = "{}.{}".format(*sys.version_info[:2])
-    for python in other_pythons():
-        if running not in run(python, "--version").stdout:
+def find_python(version: str) -> Path:
+    """An interpreter, in PATH or in pyenv's folder, that truly runs; else a skip."""
+    if version == RUNNING:
+        return Path(sys.executable)
+    shelves = (Path.home() / ".pyenv" / "versions").glob(f"{version}.*/bin/python")
+    named = shutil.which(f"python{version}")
+    for python in [*([Path(named)] if named else []), *sorted(shelves)]:
+        code = "import ensurepip, sys; print('%d.%d' % sys.version_info[:2])"
+        if run(python, "-c", code).stdout.strip() == version:
             return python
-    pytest.skip("this machine has no other Python among 3.12 and 3.13")
+    pytest.skip(f"this machine has no Python {version}")
 
 
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, built with the environment's own hatchling."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = ("-m", "build", "--wheel", "--no-isolation", "--outdir", folder)
+def archives(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The source archive, and the wheel that is built from it alone."""
+    folder = tmp_path_factory.mktemp("dist")
+    build = ("-m", "build", "--no-isolation", "--outdir", folder)
     run_well(sys.executable, *build, REPOSITORY)
-    return next(folder.glob("*.whl"))
+    return folder
 
 
-def pins() -> list[str]:
-    """Versions of the lock without hashes: a new upstream release cannot fail us."""
-    lock = (REPOSITORY / "requirements.lock").read_text()
-    return re.findall(r"^[\w.-]+==[^\s\\]+", lock, re.MULTILINE)
+@pytest.fixture(scope="module")
+def wheel(archives: Path) -> Path:
+    return next(archives.glob("*.whl"))
+
+
+def pins(lock: str = "requirements.lock") -> list[str]:
+    """Versions of a lock without hashes: a new upstream release cannot fail us."""
+    text = (REPOSITORY / lock).read_text()
+    return re.findall(r"^[\w.-]+==[^\s\\;]+", text, re.MULTILINE)
 
 
 def install(python: Path, wheel: Path, folder: Path) -> Path:
     """A fresh environment with the wheel and its base dependencies, no extras."""
-    # This environment's own pip fills it; and no bytecode: compiling half a gigabyte
-    # takes longer than unpacking it.
-    venv, constraints = folder / "venv", folder / "pins.txt"
+    venv = folder / "venv"
     run_well(python, "-m", "venv", "--without-pip", venv)
-    pip = (sys.executable, "-m", "pip", "--python", venv / "bin" / "python", "install")
-    quick = ("--no-compile", "--quiet", "--disable-pip-version-check")
     if python == Path(sys.executable):  # the same packages are here: unpacked already
-        link_base(next(venv.glob("lib/*/site-packages")))
-        run_well(*pip, *quick, "--no-index", wheel)
+        link(venv, *(pin.partition("==")[0] for pin in pins()))
+        run_well(*pip(venv), "--no-index", wheel)
         return venv
-    constraints.write_text("\n".join(pins()))
-    done = run(*pip, *quick, "-c", constraints, wheel)
-    offline = any(sign in done.stdout + done.stderr for sign in OFFLINE)
-    require(done.returncode == 0 or not offline, "no package index can be reached")
-    assert done.returncode == 0, done.stdout + done.stderr
+    fetch(venv, wheel)
     return venv
 
 
-def link_base(packages: Path) -> None:
-    """Links what the lock of the base installation names, and nothing else."""
+def add_gymnasium(python: Path, venv: Path) -> None:
+    """Follow the advice of `MissingExtra`, of which pip needs no sainet on an index."""
+    if python == Path(sys.executable):
+        link(venv, "gymnasium", "farama-notifications", "cloudpickle")
+        run_well(*pip(venv), "--no-index", "sainet[gym]")
+    else:
+        fetch(venv, "sainet[gym]")
+
+
+def pip(venv: Path) -> tuple[object, ...]:
+    """This environment's own pip, to install into another one.
+
+    Without bytecode: compiling half a gigabyte takes longer than unpacking it.
+    """
+    quick = ("install", "--no-compile", "--quiet", "--disable-pip-version-check")
+    return (sys.executable, "-m", "pip", "--python", venv / "bin" / "python", *quick)
+
+
+def fetch(venv: Path, wanted: object) -> None:
+    """Installs locked versions from an index; without one, the test is skipped."""
+    constraints = venv / "pins.txt"
+    constraints.write_text("\n".join(pins("requirements-dev.lock")))
+    done = run(*pip(venv), "-c", constraints, wanted)
+    offline = any(sign in done.stdout + done.stderr for sign in OFFLINE)
+    require(done.returncode == 0 or not offline, "no package index can be reached")
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def link(venv: Path, *names: str) -> None:
+    """Links distributions of this environment, and nothing else."""
     here = Path(sysconfig.get_path("purelib"))
-    for pin in pins():
-        for file in metadata.files(pin.partition("==")[0]) or []:
+    packages = next(venv.glob("lib/*/site-packages"))
+    for distribution in names:
+        for file in metadata.files(distribution) or []:
             name = file.parts[0]
             if name != ".." and not (packages / name).exists():
                 (packages / name).symlink_to(here / name)
@@ -122,22 +160,32 @@ def shipped(package: Path) -> set[str]:
     return {name.as_posix() for name in names if "__pycache__" not in name.parts}
 
 
-@pytest.mark.parametrize("version", ["this", "another"])
-def test_the_wheel_works_in_an_empty_environment(
+@pytest.mark.parametrize("version", PYTHONS)
+def test_the_wheel_runs_the_readme_in_an_empty_environment(
     version: str, wheel: Path, tmp_path: Path
 ):
-    python = Path(sys.executable) if version == "this" else another_python()
+    python = find_python(version)
     venv = install(python, wheel, tmp_path)
-    command = venv / "bin" / "sainet"
-    project_version = wheel.name.split("-")[1]
+    command, empty = venv / "bin" / "sainet", tmp_path / "empty"
+    empty.mkdir()
 
-    assert project_version in run_well(command, "--version", cwd=tmp_path)
-    assert "demo" in run_well(command, "--help", cwd=tmp_path)
-    origin = run_well(venv / "bin" / "python", "-c", IMPORT_ALL, cwd=tmp_path).strip()
-    shown = run_well(venv / "bin" / "python", "-c", SHOWN, cwd=tmp_path)
-    assert shown.startswith("[[0.01"), shown  # m: disk 1 moved with the pusher
-    package = Path(origin).parent
+    def shown_by(program: str) -> str:
+        path = empty / "program.py"
+        path.write_text(program)
+        return run_well(venv / "bin" / "python", path, cwd=empty)
+
+    assert wheel.name.split("-")[1] in run_well(command, "--version", cwd=empty)
+    assert "demo" in run_well(command, "--help", cwd=empty)
+    package = Path(shown_by(IMPORT_ALL).strip()).parent
     assert package.is_relative_to(venv)
     assert package.parent.name == "site-packages"
     assert "py.typed" in shipped(package)
     assert shipped(package) == shipped(SOURCE)
+
+    assert shown_by(PREDICT).startswith("[[0.01")  # m: disk 1 moved with the pusher
+    (made,) = (line for line in mentions(README.read_text()) if " generate " in line)
+    run_well(command, *made.split()[1:], cwd=empty)
+    assert "sain errs by" in shown_by(OWN)
+    assert "sain errs by" in (empty / "report.html").read_text()
+    add_gymnasium(python, venv)
+    assert shown_by(PLANNED).split() == ["True", "True"]
