@@ -6,8 +6,11 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tarfile
+from email import message_from_bytes
 from importlib import metadata
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 
@@ -158,6 +161,59 @@ def shipped(package: Path) -> set[str]:
     files = (path for path in package.rglob("*") if path.is_file())
     names = (path.relative_to(package) for path in files)
     return {name.as_posix() for name in names if "__pycache__" not in name.parts}
+
+
+@pytest.fixture(scope="module")
+def contents(archives: Path) -> dict[str, bytes]:
+    """Files of the source archive, by their paths in the repository."""
+    with tarfile.open(next(archives.glob("*.tar.gz"))) as archive:
+        return {
+            member.name.partition("/")[2]: archive.extractfile(member).read()
+            for member in archive.getmembers()
+            if member.isfile()
+        }
+
+
+def targets(markdown: str) -> list[tuple[str, str]]:
+    """Links of a page, "!" before pictures."""
+    return re.findall(r"(!?)\[[^\]]*\]\(([^)#]+)[^)]*\)", markdown)
+
+
+def test_the_source_archive_is_complete(contents: dict[str, bytes]):
+    """It has the package, the tests and all that README.md links to."""
+    package = {f"src/sainet/{name}" for name in shipped(SOURCE)}
+    tests = {f"tests/{name}" for name in shipped(REPOSITORY / "tests")}
+    assert package | tests <= contents.keys()
+    folders = {str(parent) for name in contents for parent in Path(name).parents}
+    linked = {link for _, link in targets(README.read_text()) if "://" not in link}
+    assert len(linked) > 20
+    assert linked <= contents.keys() | folders
+
+
+def test_links_and_pictures_work_on_the_page_of_an_index(
+    wheel: Path, contents: dict[str, bytes]
+):
+    (name,) = (each for each in ZipFile(wheel).namelist() if each.endswith("/METADATA"))
+    about = message_from_bytes(ZipFile(wheel).read(name))
+    assert about["Description-Content-Type"] == "text/markdown"
+    page = about.get_payload()
+    assert message_from_bytes(contents["PKG-INFO"]).get_payload() == page
+    (address,) = (each.split(", ")[1] for each in about.get_all("Project-URL"))
+    wanted = []
+    for picture, link in targets(README.read_text()):
+        tag = f"{address}/{'raw' if picture else 'blob'}/v{about['Version']}"
+        wanted.append((picture, link if "://" in link else f"{tag}/{link}"))
+    assert targets(page) == wanted
+    assert sum(picture == "!" for picture, _ in wanted) == 2
+
+
+def test_one_command_replaces_the_address_everywhere(contents: dict[str, bytes]):
+    placeholder = "-".join(("URL", "OF", "THIS", "REPOSITORY"))  # not here, too
+    found = {name for name, data in contents.items() if placeholder.encode() in data}
+    text = contents["docs/releasing.md"].decode()
+    (named,) = re.findall(rf"sed -i 's.{placeholder}.[^']*' (.*)", text)
+    places = found - {"PKG-INFO", "docs/releasing.md"}
+    assert places in (set(), set(named.split()))  # none once it is replaced
 
 
 @pytest.mark.parametrize("version", PYTHONS)
