@@ -72,7 +72,7 @@ def test_the_report_of_the_demo_plays(demo, chromium):
             title = element(driver, "title", f"episode-{block}").text
             assert title.startswith(f"{model}, {goals} goal 1: ")
             assert model == "Physics" or "solved with " in title
-        sentences = driver.find_elements("css selector", "#episodes p")
+        sentences = driver.find_elements("css selector", "#episodes > p")
         starts = [each.text.partition(":")[0] for each in sentences]
         assert starts[-2:] == ["Easy goal 1", "Hard goal 1"]
 
