@@ -250,8 +250,6 @@ def inline_svg(text: str, number: int) -> Markup:
     svg = _in_panels(svg)
     svg = re.sub(r'\bid="', f'id="figure-{number}-', svg)
     svg = re.sub(r'(href="#|url\(#)', rf"\1figure-{number}-", svg)
-    # The style sheet limits the width, so that all text has one size.
-    svg = re.sub(r'(<svg[^>]*?) width="([\d.]+)pt"', r'\1 style="--points: \2"', svg)
     variables = css_variables(dark=False)
     for name, color in sorted(variables.items(), reverse=True):
         svg = svg.replace(color, f"var({name})")
