@@ -2,6 +2,7 @@
 
 import ast
 import json
+import os
 import re
 import shlex
 import subprocess
@@ -26,7 +27,7 @@ from documents import (
 )
 from sainet import __version__
 from sainet.cli import entry
-from support import REPOSITORY
+from support import REPOSITORY, SOURCE
 
 COMMANDS = {page.name: commands(page.read_text()) for page in PAGES}
 # Reads a list of commands; answers with what each asks for and where that is written.
@@ -98,14 +99,40 @@ def test_every_documented_command_is_run_somewhere(page: Path):
     assert [line for line in lines if not line.startswith(known)] == []
 
 
+EXTRAS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"][
+    "optional-dependencies"
+]
+
+
 def test_documented_extras_exist():
-    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
     found = set()
     for page in PAGES:
         for names in re.findall(r"(?:sainet|\.)\[([a-z,]+)\]", page.read_text()):
             found |= set(names.split(","))
     assert {"bullet", "gym", "live", "mujoco"} <= found
-    assert found <= set(project["optional-dependencies"])
+    assert found <= set(EXTRAS)
+
+
+def test_messages_about_missing_packages_name_extras_that_exist():
+    asked = r"""missing_extra\(\s*(?:"[^"]*"|needs), "(\w+)\""""
+    source = "".join(path.read_text() for path in SOURCE.rglob("*.py"))
+    found = re.findall(asked, source)
+    assert len(found) == len(re.findall(r"(?<!def )missing_extra\(", source)) > 10
+    assert set(found) <= set(EXTRAS)
+
+
+def test_pip_adds_an_extra_to_the_sainet_that_is_installed(tmp_path: Path):
+    """Also where sainet came from a clone and no index has it."""
+    needed = ("-m", "pip", "install", "--dry-run", "--no-index", "sainet[gym]")
+    done = subprocess.run(
+        [sys.executable, *needed],
+        cwd=tmp_path,
+        env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "already satisfied: sainet[gym]" in done.stdout, done.stdout + done.stderr
 
 
 def test_commands_in_running_text_have_the_options_that_they_name():
@@ -189,6 +216,14 @@ def test_the_readme_names_the_test_command_that_ci_runs():
     assert "make test" in shell_lines(README.read_text())
     last = (REPOSITORY / ".ci" / "run").read_text().splitlines()[-1]
     assert last.endswith("make test")
+
+
+def test_ci_shows_the_demo_before_it_installs_what_tests_need():
+    lines = (REPOSITORY / ".ci" / "run").read_text().splitlines()
+    steps = [line for line in lines if re.search(r"\bmake [a-z-]+$", line)]
+    quiet = "PYTHONDONTWRITEBYTECODE=1"  # as in many containers; the demo broke there
+    assert steps[:3] == [f"{quiet} make setup", f"{quiet} make demo", "make setup-dev"]
+    assert "set -euo pipefail" in lines  # a step that fails ends the script
 
 
 def test_the_reader_finds_commands():

@@ -151,7 +151,7 @@ def test_without_h5py_the_message_names_the_extra(
 ):
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
     path = pack(tmp_path / "ellip1_h5.zip", {name("h5"): bytes(200)})
-    with pytest.raises(MissingExtra, match=r'pip install "sainet\[hdf5\]"'):
+    with pytest.raises(MissingExtra, match=r"pip install 'sainet\[hdf5\]'"):
         import_mitpush(path, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -437,5 +437,5 @@ def test_without_pyarrow_the_message_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(MissingExtra, match=r'pip install "sainet\[table\]"'):
+    with pytest.raises(MissingExtra, match=r"pip install 'sainet\[table\]'"):
         import_table(*as_parquet(tmp_path, b"PAR1"), tmp_path / "out")

@@ -21,8 +21,7 @@ HOSTILE = "<script>alert(1)</script> $x_{"
 
 
 def _errors(path):
-    curves, bands = samples.curves()
-    return draw_error_over_time(curves, path, time_step=samples.TIME_STEP, bands=bands)
+    return draw_error_over_time(samples.curves(), path, time_step=samples.TIME_STEP)
 
 
 DRAW = {

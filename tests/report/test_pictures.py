@@ -51,3 +51,14 @@ def test_the_models_predict_the_drawn_push_as_its_caption_states():
         name: float(np.linalg.norm(end, axis=-1).mean()) for name, end in ends.items()
     }
     assert errors["in"] < errors["physics"] and errors["sain"] < errors["physics"]
+
+
+def test_the_picture_of_the_live_page_is_small_and_shown():
+    """`tests/report/live/picture.py` takes it."""
+    data = (REPOSITORY / "docs" / "figures" / "play.png").read_bytes()
+    assert data.startswith(b"\x89PNG") and len(data) < 150_000
+    for page, link in (
+        ("README.md", "docs/figures/play.png"),
+        ("docs/tutorial-control.md", "figures/play.png"),
+    ):
+        assert f"]({link})" in (REPOSITORY / page).read_text("utf-8")

@@ -3,6 +3,7 @@
 import json
 import re
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -10,7 +11,13 @@ import pytest
 from report import samples
 from sainet.report.figures.curves import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
-from sainet.report.pages.page import Report, replay_data, to_page, write_report
+from sainet.report.pages.page import (
+    Report,
+    inline_svg,
+    replay_data,
+    to_page,
+    write_report,
+)
 
 HOSTILE = "</script><script>alert(1)</script>&\"'"
 
@@ -126,3 +133,53 @@ def test_a_report_may_be_nearly_empty(tmp_path):
     text = path.read_text()
     assert "<script" not in text
     assert "How this was made" in text
+
+
+def player(model, pushes, solved=True):
+    return samples.record(model=model, pushes=pushes, solved=solved)
+
+
+@pytest.mark.parametrize(
+    ("players", "sentence"),
+    [
+        (
+            [player("sain", 2), player("physics", 2)],
+            "SAIN and Physics each reach it with 2 pushes, so this goal does not tell "
+            "them apart.",
+        ),
+        (
+            [player("physics", 3), player("sain", 1)],
+            "SAIN reaches it with 1 push, Physics with 3 pushes.",
+        ),
+        (
+            [player("sain", 2), player("physics", 3, solved=False)],
+            "SAIN reaches it with 2 pushes; Physics does not.",
+        ),
+        (
+            [player(model, 3, solved=False) for model in ("sain", "in", "physics")],
+            "SAIN, IN and Physics do not reach it.",
+        ),
+    ],
+)
+def test_players_of_one_goal_are_compared(players, sentence):
+    other = samples.record(goals="hard")
+    page = to_page(Report(title="A report", episodes=[*players, other]))
+    assert re.findall("<p>(Easy goal 1: .*|Hard goal 1: .*)</p>", page) == [
+        f"Easy goal 1: {sentence}"
+    ]
+    # A row for each goal, each closed.
+    assert page.count('<div class="abreast">') == 2
+    assert page.count("<div") == page.count("</div>")
+
+
+def test_a_figure_on_a_page_has_an_svg_for_each_panel(tmp_path):
+    drawn = draw_paths(samples.replay(), tmp_path / "a.svg").read_text()
+    page = inline_svg(drawn, 1)
+    panels = page.split("</svg>")[:-1]
+    assert len(panels) == 3
+    titles = ("The push", "Centre of disk 1", "Centre of disk 2")
+    for panel, title in zip(panels, titles, strict=True):
+        ElementTree.fromstring(f"{panel}</svg>")  # each is complete
+        assert re.findall(">((?:The|Centre)[^<]*)<", panel) == [title]
+    said = re.compile("<text.*?>([^<]*)</text>", re.DOTALL)
+    assert said.findall(page) == said.findall(drawn)

@@ -8,7 +8,7 @@ import pytest
 from selenium import webdriver
 
 from report import samples
-from sainet.report.figures.paths import draw_paths
+from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import Report, write_report
 
 pytestmark = pytest.mark.browser
@@ -47,11 +47,13 @@ def opened(chromium, folder, *flags) -> Iterator:
 
 @pytest.fixture
 def folder(tmp_path):
-    figure = draw_paths(samples.replay(), tmp_path / "paths.svg")
+    paths = draw_paths(samples.replay(), tmp_path / "paths.svg")
+    errors = tmp_path / "errors.svg"
+    draw_error_over_time(samples.curves(), errors, time_step=samples.TIME_STEP)
     report = Report(
         title="A report",
         table=samples.result(),
-        figures=[(figure, "Paths of one push.")],
+        figures=[(errors, "Mean errors."), (paths, "Paths of one push.")],
         replays=[samples.replay()],
         episodes=[
             samples.record(),
@@ -220,11 +222,46 @@ def test_an_episode_plays_to_its_end(still):
     assert lost == "the simulated world left after 3 pushes: disk 2 is nowhere"
 
 
+PHONE = {"width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": True}
+
+
+def corners(driver, selector):
+    """The left and top corner of each element, from left to right and top to bottom."""
+    return driver.execute_script(
+        "return [...document.querySelectorAll(arguments[0])]"
+        ".map((each) => each.getBoundingClientRect())"
+        ".map(({ left, top }) => [Math.round(left), Math.round(top)]);",
+        selector,
+    )
+
+
 def test_nothing_is_wider_than_a_phone(still):
-    size = {"width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": True}
-    still.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    still.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
     wide = still.execute_script("return document.documentElement.scrollWidth")
     assert wide == 390
+    # The table of errors alone scrolls, beside the names of its rows.
+    outside = still.execute_script(
+        "const ends = (each) => each.getBoundingClientRect();"
+        "return [...document.querySelectorAll('body *:not(table.errors, .errors *)')]"
+        ".filter((each) => ends(each).right > innerWidth || ends(each).left < 0)"
+        ".map((each) => each.outerHTML.slice(0, 200));"
+    )
+    assert outside == []
+
+
+@pytest.mark.parametrize(
+    ("selector", "count"),
+    [("#figure-1 svg", 2), ("#figure-2 svg", 3), ("[data-episode]", 3)],
+)
+def test_panels_and_players_are_abreast_but_below_each_other_on_a_phone(
+    selector, count, still
+):
+    wide = corners(still, selector)
+    assert len(wide) == count
+    assert wide[0][0] < wide[1][0] and wide[0][1] == wide[1][1]
+    still.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", PHONE)
+    tops = [top for _, top in corners(still, selector)]
+    assert sorted(set(tops)) == tops
 
 
 def test_playback_starts_when_visible(chromium, folder):

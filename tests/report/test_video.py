@@ -68,7 +68,7 @@ def test_without_the_extra_mp4_names_it(tmp_path, monkeypatch):
     assert best_format() == ".mp4"
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     assert best_format() == ".gif"
-    with pytest.raises(MissingExtra, match=r'pip install "sainet\[video\]"'):
+    with pytest.raises(MissingExtra, match=r"pip install 'sainet\[video\]'"):
         write_film(record(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())
 

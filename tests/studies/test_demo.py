@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from selenium.webdriver.support.ui import WebDriverWait
 
@@ -15,6 +16,7 @@ from sainet.evaluation.claims import Claim, Verdict
 from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
 from sainet.studies import STUDIES, load_study
+from sainet.studies.demo import typical_push
 from sainet.studies.paper_tables import PUBLISHED_ROBOT_TWO_DISKS
 from sainet.studies.steps import Join
 from sainet.studies.study import Plan, Result, Ruling, Study
@@ -41,8 +43,17 @@ def test_the_demo_compares_four_models_on_both_disks(demo):
     models = ("physics", "physics-true", "in", "sain")
     assert rows == {(model, body) for model in models for body in (1, 2)}
     assert all(row["n"] == 6 for row in result["rows"])
-    told = "100 pushes for 2 iterations of the paper's 10,000"
-    assert told in html.unescape((out / "report.html").read_text())
+    page = html.unescape((out / "report.html").read_text())
+    assert "100 pushes for 2 iterations of the paper's 10,000" in page
+    assert "nearest to the median of all 6 test pushes" in page
+
+
+@pytest.mark.parametrize("wanted", range(5))
+def test_the_shown_push_compares_as_most_pushes_do(wanted):
+    """On each disk its share is near the median: not 0.4 and 0.1, for example."""
+    shares = np.array([[0.1, 0.2], [0.2, 0.5], [0.3, 0.25], [0.4, 0.1], [2.0, 3.0]])
+    shares = np.roll(shares, wanted, axis=0)
+    assert typical_push(shares) == (2 + wanted) % 5
 
 
 MODELS = ("SAIN", "Physics")
@@ -61,6 +72,9 @@ def test_the_report_of_the_demo_plays(demo, chromium):
             title = element(driver, "title", f"episode-{block}").text
             assert title.startswith(f"{model}, {goals} goal 1: ")
             assert model == "Physics" or "solved with " in title
+        sentences = driver.find_elements("css selector", "#episodes > p")
+        starts = [each.text.partition(":")[0] for each in sentences]
+        assert starts[-2:] == ["Easy goal 1", "Hard goal 1"]
 
 
 def test_an_unknown_study_lists_the_available_studies():

@@ -85,7 +85,7 @@ def test_hidden_content_of_a_figure_is_left_out(tmp_path):
     page = page_of(tmp_path)
     assert "alert" not in page
     assert "me@home url(x)" in page  # a label is text
-    assert page.count("<svg") == 1
+    assert page.count("<svg") == 3  # one for each panel
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from sainet.api.engines import AbstractHostEngine, Part, own_model, packed
 from sainet.engines.simulator import OwnSpec
 from sainet.models.model import Model
 from sainet.runs.documents import checked
-from sainet.runs.errors import BadInput, MissingExtra, shown
+from sainet.runs.errors import BadInput, missing_extra, shown
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
@@ -26,7 +26,6 @@ from sainet.scenes.state import State
 _JOINTS = ("slide x", "slide y", "hinge z", "slide z", "hinge x", "hinge y")
 _COUNTS = {"F": 6, "HSS": 4, "HSSS": 4}  # of them, by initials: free, hinge, slide
 _REMEDY = "give it a freejoint, or slides along x and y (and z) and a hinge about z"
-_EXTRA = "`from_mjcf` needs MuJoCo: pip install 'sainet[mujoco]'."
 _TABLE, _RIM = 1, 2  # bits: what touches the table, and what touches a rim
 _KEPT = ("size", "pos", "quat", "condim", "solref", "solimp", "margin", "gap")
 _SETTLED = 0.1  # s, until disks rest on the table
@@ -49,7 +48,7 @@ class Pucks:
             import mujoco
             from mujoco.batch import Batch
         except ImportError:
-            raise MissingExtra(_EXTRA) from None
+            raise missing_extra("`from_mjcf` needs MuJoCo", "mujoco") from None
         mj: Part = mujoco
         self._path, self._mujoco, self._batch = path, mj, Batch
         self._cylinder = mj.mjtGeom.mjGEOM_CYLINDER

@@ -171,6 +171,9 @@ def episode_data(record: EpisodeRecord) -> dict[str, object]:
     frames = EpisodeFrames(record)
     return {
         "title": episode_title(record),
+        "model": style_of(record.model).label,
+        "goal_name": f"{record.goals} goal {record.trial + 1}",
+        "pushes": record.pushes,
         "said": outcome(record),
         "solved": record.solved,
         "timeStep": 1 / FRAMES_PER_SECOND,

@@ -108,6 +108,21 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownName:
     )
 
 
+def missing_extra(needs: str, extra: str, instead: str = "") -> MissingExtra:
+    """Return the error for a package that an extra adds.
+
+    The advice works from any folder: pip takes the sainet that is installed, also one
+    from a clone, and adds the packages of the extra.
+
+    Args:
+        needs: what needs which package, for example "Parquet needs pyarrow".
+        extra: name of the extra.
+        instead: what works without it.
+    """
+    otherwise = f"; without it {instead}" if instead else ""
+    return MissingExtra(f"{needs}: pip install 'sainet[{extra}]'{otherwise}.")
+
+
 def hint(name: str, known: Iterable[str]) -> str:
     """Return " (did you mean ...?)" with the most similar known name, or nothing."""
     nearest = get_close_matches(name[:_LONGEST_SHOWN], tuple(known), n=1)

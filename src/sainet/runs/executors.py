@@ -21,7 +21,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any, final
 
-from sainet.runs.errors import BadInput, MissingExtra, SainetError
+from sainet.runs.errors import BadInput, SainetError, missing_extra
 from sainet.runs.interrupts import forget_interrupts, remember_interrupt
 from sainet.runs.manifest import code_versions, use_cache
 from sainet.runs.shards import Shard
@@ -85,10 +85,8 @@ class Machines:
 def _connected(address: str) -> Any:  # noqa: ANN401
     """Return a client of a scheduler, all of whose workers can do our work."""
     if find_spec("distributed") is None:
-        raise MissingExtra(
-            "A Dask scheduler needs the package distributed: pip install "
-            "'sainet[cluster]'."
-        )
+        needs = "A Dask scheduler needs the package distributed"
+        raise missing_extra(needs, "cluster")
     from distributed import Client
 
     # Dask would report a lost connection in many lines; our error is one.

@@ -17,7 +17,7 @@ from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.summary import Summary, summarise
 from sainet.learning.recipes import PAPER
 from sainet.models.model import Model
-from sainet.report.episode_frames import Replay, outcome
+from sainet.report.episode_frames import outcome
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
 from sainet.report.pages.page import REPORT, Report, write_report
 from sainet.report.replays import build_replay, error_curves
@@ -37,7 +37,8 @@ residual. All pushes here are simulated, with noise; the networks were trained o
 {pushes:,} pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, \
 true properties, uses the true masses and radii, and an assumed friction.
 
-The replay shows the test push on which the engine has its median error. Then \
+The replay shows a typical test push: for both disks, the final position error of SAIN \
+over that of physics is nearest to the median of all {test_pushes:,} test pushes. Then \
 the SAIN that ships with the package, trained for all {paper:,}, pushes disk 2 to an \
 easy and to a hard goal by the paper's search, and so does physics; that world is \
 simulated as well, with disks, friction and noise that differ from those of the \
@@ -134,7 +135,10 @@ def _draw(
     config: DemoConfig,
     out: Path,
 ) -> Report:
-    replay = _median_replay(models, test, evaluation)
+    final = [evaluation.values("final_pos_mm", name) for name in ("sain", "physics")]
+    push = typical_push(final[0] / final[1])
+    title = f"Test push {push + 1}"
+    replay = build_replay(models, test, push, title=title, steps=PAPER_STEPS)
     curves = error_curves(models, test, steps=PAPER_STEPS, pushes=config.test_pushes)
     paths = draw_paths(replay, out / "paths.svg")
     errors = draw_error_over_time(
@@ -145,6 +149,7 @@ def _draw(
         subtitle="A robot pushes a disk that pushes another: engine, network, and both",
         summary=_SUMMARY.format(
             pushes=config.pushes,
+            test_pushes=config.test_pushes,
             iterations=config.iterations,
             paper=PAPER.optimiser.iterations,
         ),
@@ -158,12 +163,11 @@ def _draw(
     )
 
 
-def _median_replay(
-    models: list[Model], test: Store, evaluation: Measurements
-) -> Replay:
-    """Return the push on which physics has its median error."""
-    error = evaluation.values("final_pos_mm", "physics").mean(axis=1)
-    push = int(np.argsort(error)[len(error) // 2])
-    return build_replay(
-        models, test, push, title=f"Test push {push + 1}", steps=PAPER_STEPS
-    )
+def typical_push(share: np.ndarray) -> int:
+    """Return the push whose shares are nearest to the medians of all pushes.
+
+    Args:
+        share: error of one model over that of another, ``[push, body]``.
+    """
+    off = np.log(share / np.median(share, axis=0))
+    return int(np.abs(off).sum(axis=-1).argmin())

@@ -22,7 +22,7 @@ from sainet.learning.recipes import FINE_TUNING, FromModel
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.robots import Surface
-from sainet.runs.errors import MissingExtra
+from sainet.runs.errors import missing_extra
 from sainet.studies import Scale, steps
 from sainet.studies.paper_setup import IN, SAIN, physics, scaled
 from sainet.studies.recorded_models import IDENTIFIED, Variant
@@ -59,9 +59,7 @@ SIZES = {
 
 def _mujoco(scope: Scope) -> None:
     if find_spec("mujoco") is None:
-        raise MissingExtra(
-            "The virtual lab needs MuJoCo: pip install 'sainet[mujoco]'."
-        )
+        raise missing_extra("The virtual lab needs MuJoCo", "mujoco")
 
 
 MUJOCO: Need = _mujoco

@@ -1,5 +1,8 @@
 """The live page in headless Chromium: drag, predict, push, plan, reload."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import pytest
 from selenium import webdriver
 from selenium.webdriver import ActionChains, Keys
@@ -11,20 +14,17 @@ from sainet.report.live.config import PlayConfig
 pytestmark = pytest.mark.browser
 
 
-@pytest.fixture
-def page(chromium, tmp_path):
+@contextmanager
+def opened(chromium, folder, **settings) -> Iterator[webdriver.Chrome]:
     """The page in a browser; at the end nothing may have been logged as an error."""
     options = webdriver.ChromeOptions()
     options.binary_location = str(chromium.browser)
-    flags = (
-        f"--user-data-dir={tmp_path / 'profile'}",
-        "--force-prefers-reduced-motion",
-    )
+    flags = (f"--user-data-dir={folder / 'profile'}", "--force-prefers-reduced-motion")
     for flag in (*FLAGS, *flags):
         options.add_argument(flag)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     service = webdriver.ChromeService(executable_path=str(chromium.driver))
-    config = PlayConfig(port=0, noise_level="none", out=tmp_path / "play")
+    config = PlayConfig(port=0, noise_level="none", out=folder / "play", **settings)
     with running(config) as server:
         driver = webdriver.Chrome(options=options, service=service)
         try:
@@ -35,6 +35,12 @@ def page(chromium, tmp_path):
             assert [entry for entry in logged if entry["level"] == "SEVERE"] == []
         finally:
             driver.quit()
+
+
+@pytest.fixture
+def page(chromium, tmp_path):
+    with opened(chromium, tmp_path) as driver:
+        yield driver
 
 
 def is_ready(page):

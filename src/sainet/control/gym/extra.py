@@ -1,12 +1,10 @@
 """Gymnasium, or the message that it is missing."""
 
-from sainet.runs.errors import MissingExtra
+from sainet.runs.errors import missing_extra
 
 __all__ = ["gymnasium"]
 
 try:
     import gymnasium
 except ImportError:
-    raise MissingExtra(
-        "The environments need Gymnasium: pip install 'sainet[gym]'."
-    ) from None
+    raise missing_extra("The environments need Gymnasium", "gym") from None

@@ -19,7 +19,7 @@ from sainet.datasets.recorded.tables import (
     Texts,
 )
 from sainet.datasets.schema import Arrays
-from sainet.runs.errors import BadTable, MissingExtra
+from sainet.runs.errors import BadTable, missing_extra
 
 
 def read_parquet(
@@ -74,10 +74,8 @@ def _load_parquet(path: Path, data: bytes, columns: Columns, problems: Problems)
     try:
         from pyarrow import parquet  # pyright: ignore[reportMissingImports]
     except ImportError:
-        raise MissingExtra(
-            'Parquet needs the package pyarrow: pip install "sainet[table]"; '
-            "without it give the table as .csv."
-        ) from None
+        needs = "Parquet needs the package pyarrow"
+        raise missing_extra(needs, "table", "give the table as .csv") from None
     with _decoding(path, "Parquet", "write it again"):
         file = parquet.ParquetFile(io.BytesIO(data))
         header = file.schema_arrow.names

@@ -27,7 +27,7 @@ from sainet.datasets.recorded.properties import (
 from sainet.datasets.recorded.resample import ResampledPush, Track, resample
 from sainet.datasets.store import Store
 from sainet.runs.documents import content_hash, to_json
-from sainet.runs.errors import BadTable, MissingExtra
+from sainet.runs.errors import BadTable, missing_extra
 from sainet.scenes.recording import Conditions, Recording
 
 _log = logging.getLogger(__name__)
@@ -237,10 +237,9 @@ def _load_hdf5(data: bytes) -> dict[str, np.ndarray]:
     try:
         import h5py  # pyright: ignore[reportMissingImports]
     except ImportError:
-        raise MissingExtra(
-            'HDF5 files need the package h5py: pip install "sainet[hdf5]"; '
-            "without it give the .json files of the same pushes."
-        ) from None
+        needs = "HDF5 files need the package h5py"
+        instead = "give the .json files of the same pushes"
+        raise missing_extra(needs, "hdf5", instead) from None
     # The HDF5 library raises arbitrary exceptions on damaged files.
     try:
         with h5py.File(io.BytesIO(data), "r") as file:

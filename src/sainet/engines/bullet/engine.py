@@ -13,7 +13,7 @@ from jaxtyping import Array
 
 from sainet.engines.base import AbstractEngine
 from sainet.engines.bullet.world import Job, Moved, roll_jobs
-from sainet.runs.errors import BadScene, MissingExtra
+from sainet.runs.errors import BadScene, MissingExtra, missing_extra
 from sainet.runs.workers import core_count, spawned_pool, worker_lost
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
@@ -35,7 +35,7 @@ class BulletEngine(AbstractEngine):
     def __check_init__(self) -> None:
         """Raise `MissingExtra` if PyBullet is not installed."""
         if find_spec("pybullet") is None:
-            raise MissingExtra(_how_to_install())
+            raise _how_to_install()
 
     @property
     def on_host(self) -> bool:
@@ -108,15 +108,15 @@ def _arrays(scene: Scene, initial: State, controls: Controls) -> dict[str, Array
     return arrays
 
 
-def _how_to_install() -> str:
+def _how_to_install() -> MissingExtra:
     if sys.version_info[:2] > _NEWEST_PYTHON:
         here = ".".join(map(str, sys.version_info[:2]))
-        return (
+        return MissingExtra(
             "The engine bullet needs PyBullet, which has no wheels for Python "
             f"{here}, where the extra 'bullet' installs nothing; use Python 3.11, or "
             "the engine planar."
         )
-    return "The engine bullet needs PyBullet: pip install 'sainet[bullet]'."
+    return missing_extra("The engine bullet needs PyBullet", "bullet")
 
 
 def roll_everywhere(jobs: list[Job]) -> Moved:

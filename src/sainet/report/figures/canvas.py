@@ -58,6 +58,15 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def name_panels(figure: Figure) -> None:
+    """Name the panels of a row by their place and width (points), for wrapping."""
+    figure.draw_without_rendering()
+    for axes in figure.axes:
+        ends = axes.get_tightbbox().intervalx  # type: ignore[union-attr]
+        left, right = 72 / figure.dpi * np.maximum(ends, 0)
+        axes.set_gid(f"panel-{left:.1f}-{right - left:.1f}")
+
+
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure in the format of its suffix, atomically."""
     suffix = path.suffix.lower()

@@ -44,15 +44,12 @@ def draw_paths(replay: Replay, path: Path) -> Path:
         _draw_scene(panels[0], replay, styles)
         for body, axes in enumerate(panels[1:]):
             _draw_lens(axes, replay, body, styles)
+        canvas.name_panels(figure)
         return canvas.save(figure, path)
 
 
 def draw_error_over_time(
-    curves: Mapping[str, Curve],
-    path: Path,
-    *,
-    time_step: float,
-    bands: Mapping[str, tuple[Curve, Curve]] | None = None,
+    curves: Mapping[str, Curve], path: Path, *, time_step: float
 ) -> Path:
     """Draw the mean position error over the time of a push, one panel per disk.
 
@@ -60,7 +57,6 @@ def draw_error_over_time(
         curves: by model, the error after each step (mm).
         path: where to write; ``.svg`` or ``.png``.
         time_step: seconds between two steps; the first row is one step in.
-        bands: by model, the low and high ends of an interval (mm), if there is one.
     """
     styles = styles_of(curves)
     bodies = next(iter(curves.values())).shape[1]
@@ -71,31 +67,18 @@ def draw_error_over_time(
             for name, curve in curves.items():
                 time = time_step * np.arange(1, len(curve) + 1)
                 axes.plot(time, curve[:, body], **canvas.line_look(styles[name]))
-                if bands and name in bands:
-                    low, high = (side[:, body] for side in bands[name])
-                    look = {"color": styles[name].color, "linewidth": 0}
-                    axes.fill_between(time, low, high, alpha=0.16, **look)
-            axes.set(xlabel="time (s)", title=f"Disk {body + 1}")
-        panels[0].set_ylabel("mean position error (mm)")
-        panels[0].set_ylim(bottom=0)
-        for axes in panels:
+            words = {"xlabel": "time (s)", "ylabel": "mean position error (mm)"}
+            axes.set(**words, title=f"Disk {body + 1}")
             axes.set_xlim(0, axes.dataLim.x1)
-            axes.margins(x=0)
+            axes.tick_params(labelleft=True)  # a page may stack the panels
             canvas.add_grid(axes)
+        panels[0].set_ylim(bottom=0)
         figure.draw_without_rendering()
-        _label_panels(panels, curves, styles, time_step)
+        for body, axes in enumerate(panels):
+            ends = [(time_step * len(each), each[-1, body]) for each in curves.values()]
+            canvas.label_ends(axes, list(styles.values()), ends)
+        canvas.name_panels(figure)
         return canvas.save(figure, path)
-
-
-def _label_panels(
-    panels: np.ndarray,
-    curves: Mapping[str, Curve],
-    styles: dict[str, ModelStyle],
-    time_step: float,
-) -> None:
-    for body, axes in enumerate(panels):
-        ends = [(time_step * len(curve), curve[-1, body]) for curve in curves.values()]
-        canvas.label_ends(axes, list(styles.values()), ends)
 
 
 def _push_panels(lenses: int, models: int) -> tuple[Figure, list[Axes]]:

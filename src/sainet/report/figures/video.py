@@ -20,7 +20,7 @@ from sainet.report.figures.canvas import add_grid, house_look, new_figure
 from sainet.report.figures.episodes import body_color
 from sainet.report.palette import INK, TARGET
 from sainet.runs.documents import atomic_path
-from sainet.runs.errors import MissingExtra
+from sainet.runs.errors import missing_extra
 
 _PIXELS = (960, 544)  # multiples of 16, as encoders require
 _DOTS_PER_INCH = 100
@@ -196,10 +196,8 @@ def _write_mp4(frames: Iterator[Frame], path: Path) -> None:
     try:
         from imageio_ffmpeg import write_frames
     except ImportError:
-        raise MissingExtra(
-            'MP4 needs the package imageio-ffmpeg: pip install "sainet[video]"; '
-            "without it animations are written as .gif."
-        ) from None
+        needs = "MP4 needs the package imageio-ffmpeg"
+        raise missing_extra(needs, "video", "animations are written as .gif") from None
     # FFmpeg does not support the suffix of the temporary file.
     writer = write_frames(
         str(path), _PIXELS, fps=FRAMES_PER_SECOND, output_params=["-f", "mp4"]

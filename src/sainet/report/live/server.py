@@ -23,7 +23,7 @@ from sainet.report.live.messages import (
     read_message,
 )
 from sainet.report.live.page import SOCKET, Asset, assets
-from sainet.runs.errors import BadSetting, MissingExtra, SainetError
+from sainet.runs.errors import BadSetting, SainetError, missing_extra
 
 if TYPE_CHECKING:
     from websockets.asyncio.server import Server, ServerConnection
@@ -51,9 +51,7 @@ def serve(config: PlayConfig, *, on_listening: Callable[[str], None]) -> None:
         BadInput: a model or the world cannot be used.
     """
     if find_spec("websockets") is None:
-        raise MissingExtra(
-            "The live page needs the package websockets: pip install 'sainet[live]'."
-        )
+        raise missing_extra("The live page needs the package websockets", "live")
     from sainet.models.library import PHYSICS, network_folder
 
     for name in config.model:

@@ -28,7 +28,6 @@ _DECIMALS_MM = 3
 _DECIMALS_RAD = 5
 _SPEEDS = (0.1, 0.25, 1)  # that a reader chooses from, slow ones first
 _LONGEST = 10  # seconds that a push plays, at such a speed
-_PIXELS_PER_POINT = 1.4
 # Elements and attributes of figures drawn by this package.
 _SHAPES = ("svg", "defs", "style", "g", "path", "use", "text", "clipPath", "rect")
 _ATTRIBUTES = {
@@ -37,6 +36,8 @@ _ATTRIBUTES = {
 }
 # CSS that loads external content, and escapes that could hide it.
 _REFERS_OUTSIDE = re.compile(r"url\(\s*(?!#)|@|\\", re.IGNORECASE)
+_PANEL = re.compile(r'<g id="panel-([\d.]+)-([\d.]+)">')
+_WIDTH = re.compile(r'(<svg[^>]*?) width="[\d.]+pt"([^>]*?) viewBox="0 0 [\d.]+ ')
 _NAMESPACES = {
     "": "http://www.w3.org/2000/svg",
     "xlink": "http://www.w3.org/1999/xlink",
@@ -246,19 +247,25 @@ def inline_svg(text: str, number: int) -> Markup:
     """
     svg = text[text.index("<svg") :]
     svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
+    svg = _in_panels(svg)
     svg = re.sub(r'\bid="', f'id="figure-{number}-', svg)
     svg = re.sub(r'(href="#|url\(#)', rf"\1figure-{number}-", svg)
-    svg = re.sub(r'^<svg([^>]*?) width="([\d.]+)pt"', _at_reading_size, svg)
     variables = css_variables(dark=False)
     for name, color in sorted(variables.items(), reverse=True):
         svg = svg.replace(color, f"var({name})")
     return Markup(svg)
 
 
-def _at_reading_size(opening: re.Match[str]) -> str:
-    """Return the figure with a limited width, so that all text has one size."""
-    width = float(opening[2]) * _PIXELS_PER_POINT
-    return f'<svg style="max-width: {width:.0f}px"{opening[1]} width="{opening[2]}pt"'
+def _in_panels(svg: str) -> str:
+    """Return a figure with an SVG for each named panel, for pages of any width."""
+    head, *parts = _PANEL.split(svg)
+    # Without the background, which would cover a neighbour.
+    head = head.partition('<g id="figure_1">')[0] + "<g><g>"
+    panels = [
+        _WIDTH.sub(rf'\1 width="{wide}pt"\2 viewBox="{left} 0 {wide} ', head) + panel
+        for left, wide, panel in zip(parts[::3], parts[1::3], parts[2::3], strict=True)
+    ]
+    return "</g></svg>".join(panels) or svg
 
 
 def _flatten(

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.robots.lab.hidden import PUSHER_RADIUS, Lab
-from sainet.runs.errors import MissingExtra
+from sainet.runs.errors import missing_extra
 
 TICK = 0.004  # s, between commands and between samples
 _STEP = 0.001  # s, of the simulation
@@ -48,9 +48,7 @@ class Mechanics:
             import mujoco
             from mujoco.batch import Batch
         except ImportError:
-            raise MissingExtra(
-                "The virtual lab needs MuJoCo: pip install 'sainet[mujoco]'."
-            ) from None
+            raise missing_extra("The virtual lab needs MuJoCo", "mujoco") from None
         # MuJoCo's stubs do not name this class.
         model: Any = mujoco.MjModel.from_xml_string(  # pyright: ignore[reportAttributeAccessIssue]
             _xml(lab)

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.robots.wire.limits import COORDINATE, Stopped
-from sainet.runs.errors import MissingExtra
+from sainet.runs.errors import missing_extra
 
 CORRECTION = 3  # message type: sent for position guidance
 _MOTORS_ON, _RAPID_STOPPED, _EGM_RUNNING = 1, 1, 3
@@ -119,10 +119,7 @@ def _messages() -> _Messages:
         from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
         from google.protobuf.message import DecodeError
     except ImportError:
-        raise MissingExtra(
-            "EGM needs protobuf, which is not installed; run "
-            "pip install 'sainet[robot]'."
-        ) from None
+        raise missing_extra("EGM needs the package protobuf", "robot") from None
     kinds = descriptor_pb2.FieldDescriptorProto
     file = descriptor_pb2.FileDescriptorProto(name="sainet/egm.proto", package="egm")
     for name, fields in _FIELDS.items():

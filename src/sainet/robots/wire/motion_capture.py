@@ -10,7 +10,7 @@ import numpy as np
 from sainet.robots.wire.clock import AbstractClock, RealClock
 from sainet.robots.wire.frames import Rigid
 from sainet.robots.wire.tracker import AbstractTracker, Frame
-from sainet.runs.errors import MissingExtra
+from sainet.runs.errors import missing_extra
 
 _MOST_WAITING = 100_000  # frames
 
@@ -37,10 +37,8 @@ class MotionCapture(AbstractTracker):
         try:
             package = import_module("motioncapture")
         except ImportError:
-            raise MissingExtra(
-                "Motion capture needs the package motioncapture: "
-                "pip install 'sainet[robot]'"
-            ) from None
+            needs = "Motion capture needs the package motioncapture"
+            raise missing_extra(needs, "robot") from None
         self._clock, self._count = clock or RealClock(), 0
         self._waiting = deque[Frame](maxlen=_MOST_WAITING)
         self._ended = Event()
