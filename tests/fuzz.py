@@ -61,6 +61,7 @@ from sainet.runs.documents import (  # noqa: E402
 from sainet.runs.errors import SainetError  # noqa: E402
 from sainet.runs.folders import open_run  # noqa: E402
 from sainet.scenes.recording import CameraOffset  # noqa: E402
+from support import write_sealed  # noqa: E402
 
 SLOWEST = 10.0  # s for one case
 MOST_MEMORY = 2 << 20  # kB that one case may add
@@ -182,6 +183,10 @@ def damage_json(rng, path: Path) -> str:
         inner[where[-1]] = pick(rng, VALUES)
         how = f"set to {str(inner[where[-1]])[:20]!r}"
     path.write_text(json.dumps(value))
+    if "seal" in value and rng.random() < 0.8:
+        with contextlib.suppress(ValueError):  # NaN, or not Unicode
+            write_sealed(path, value)
+            how += ", seal fits"
     return f"{path.name}: {'.'.join(map(str, where))} {how}"
 
 
@@ -301,7 +306,7 @@ def damage_network(rng, out: Path) -> str:
     if weights.is_file() and not weights.is_symlink() and rng.random() < 0.7:
         found = json.loads(card.read_text())
         found["weights"] = content_hash(weights.read_bytes())
-        card.write_text(json.dumps(found))
+        write_sealed(card, found)
         said += ", hash matches"
     return said
 
@@ -338,8 +343,8 @@ def make_control(out: Path) -> None:
     write_json(out / "manifest.json", {"versions": {"sainet": "0.1.0"}})
     names = [f"episodes/{trial:03d}.json" for trial in range(3)]
     for trial, name in enumerate(names):
-        write_json(out / name, samples.record_json(trial=trial))
-    write_json(out / "episodes.json", {"episodes": names})
+        write_sealed(out / name, samples.record_json(trial=trial))
+    write_sealed(out / "episodes.json", {"episodes": names})
 
 
 def read_report(out: Path) -> None:
@@ -352,7 +357,11 @@ def read_episode(out: Path) -> None:
     from sainet.control.record import read_record
 
     for path in sorted((out / "episodes").glob("*.json")):
-        numbers_of(msgspec.to_builtins(read_record(path)))
+        found = read_record(path)
+        numbers_of(msgspec.to_builtins(found))
+        end = math.inf if found.final_mm is None else found.final_mm
+        reached = end < found.tolerance_mm + 0.1
+        expect(reached or not found.solved, "solved", f"true at {end} mm")
 
 
 # --------------------------------------------------------------------------- tables

@@ -198,6 +198,16 @@ def test_a_damaged_push_is_named_with_a_remedy(done, tmp_path, text, says):
         collect(CONFIG, out)
 
 
+def test_an_edited_push_is_refused(done, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(done[0], out)
+    (out / SUMMARY).unlink()
+    text = push_file(out, 7).read_text()
+    push_file(out, 7).write_text(text.replace('"trouble":""', '"trouble":"none"'))
+    with pytest.raises(BadInput, match="000007.json: seal: .*edited. Delete it"):
+        collect(CONFIG, out)
+
+
 def test_a_push_of_another_index_is_refused(done, tmp_path):
     path = tmp_path / "000004.json"
     path.write_bytes(push_file(done[0], 3).read_bytes())

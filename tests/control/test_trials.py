@@ -1,5 +1,6 @@
 """Trials: seeded, resumable, the same goals for every model."""
 
+import contextlib
 import json
 import math
 import shutil
@@ -24,11 +25,13 @@ from sainet.control.trials import measure_trials, prepare, run_share, run_trials
 from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
 from sainet.models.identity import ModelId
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
-from sainet.runs.documents import read_json
+from sainet.runs.documents import read_json, write_json
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.runs.folders import CONFIG as CONFIG_FILE
 from sainet.runs.shards import Shard
 from sainet.scenes.recording import Recording
+from sainet.studies.run_report import report_of
+from support import write_sealed
 
 CONFIG = ControlConfig(model="physics", trials=2, pushes=2)
 
@@ -48,7 +51,7 @@ def test_an_episode_file_is_complete(done):
     assert [r.trial for r in records] == [0, 1]
     for index, record in enumerate(records):
         written = json.loads(episode_file(out, index).read_text())
-        assert written == msgspec.to_builtins(record)
+        assert written | {"seal": ""} == msgspec.to_builtins(record)
         assert record.reason.startswith("out of pushes: the goal was 177 mm away")
         assert len(record.steps) == record.pushes == 2
         step = record.steps[0]
@@ -86,7 +89,7 @@ def test_shards_run_the_same_episodes(done, tmp_path):
     assert run_share(CONFIG, out, Shard(3, 3)) == 0
     before = episode_file(out, 1).read_bytes()
     episode_file(out, 1).write_bytes(before.replace(b"1", b"2", 1))
-    with pytest.raises(BadInput, match=r"001\.json: was changed after a shard"):
+    with pytest.raises(BadInput, match=r"001\.json: .*(edited|another episode)"):
         run_trials(CONFIG, out)
     episode_file(out, 1).write_bytes(before)
     records = run_trials(CONFIG, out)
@@ -230,6 +233,9 @@ def put(name, value):
         (put("model", "\ud800"), "JSON is malformed|surrogate|Invalid"),
         (put("moved", 2), "moved is 2 of 2 disks"),
         (put("trial", 1), "trial is 1, which is another episode"),
+        (put("solved", True), "solved is True, but final_mm is 1.*and tolerance_mm"),
+        (put("final_mm", 1.0), "final_mm is 1, but final is elsewhere"),
+        (put("final", [[None] * 3] * 2), "final_mm is 1.*, but final is elsewhere"),
     ],
 )
 def test_errors_in_an_episode_file_are_named(tmp_path, done, damage, says):
@@ -237,9 +243,24 @@ def test_errors_in_an_episode_file_are_named(tmp_path, done, damage, says):
     shutil.copytree(done[0], out)
     known = json.loads(episode_file(out, 0).read_text())
     damage(known)
-    episode_file(out, 0).write_text(json.dumps(known))
+    with contextlib.suppress(ValueError):  # what ours never writes
+        episode_file(out, 0).write_text(json.dumps(known))
+        write_sealed(episode_file(out, 0), known)
     with pytest.raises(BadInput, match=says + ".*elete it"):
         run_trials(CONFIG, out)
+
+
+@pytest.mark.parametrize("edit", [put("decision_s", [9.0]), lambda r: r.pop("seal")])
+def test_an_edited_episode_is_refused(tmp_path, done, edit):
+    out = tmp_path / "out"
+    shutil.copytree(done[0], out)
+    known = json.loads(episode_file(out, 1).read_text())
+    edit(known)
+    write_json(episode_file(out, 1), known)
+    (out / SUMMARY).unlink()  # unfinished
+    for again in (lambda: run_trials(CONFIG, out), lambda: report_of(out)):
+        with pytest.raises(BadInput, match=r"001\.json: seal: .* Delete it"):
+            again()
 
 
 def test_models_share_worlds_but_not_properties():
@@ -320,10 +341,12 @@ def paired_test(one, other, measure="solved"):
 
 
 def records_of(solved, pushes=20, final=3.0, reason="solved"):
-    usual = samples.record(final_mm=final, reason=reason, decision_s=[0.1, 0.3])
-    return [
-        msgspec.structs.replace(usual, pushes=pushes, solved=each) for each in solved
-    ]
+    usual = {"final_mm": final, "reason": reason, "decision_s": [0.1, 0.3]}
+    made = {
+        each: samples.record(solved=each, tolerance_mm=5.9 if each else 1.0, **usual)
+        for each in set(solved)
+    }
+    return [msgspec.structs.replace(made[each], pushes=pushes) for each in solved]
 
 
 def test_success_has_wilsons_interval():

@@ -131,7 +131,7 @@ def test_other_seeds_make_other_pushes(whole_store, tmp_path):
         assert not np.array_equal(one, two)
 
 
-def test_a_damaged_chunk_is_made_again(whole_store, tmp_path):
+def test_a_lost_chunk_is_made_again_and_an_edited_one_is_named(whole_store, tmp_path):
     out = tmp_path / "store"
     shutil.copytree(whole_store, out)
     hashes = json.loads((out / schema.HASHES).read_text())["files"]
@@ -142,9 +142,13 @@ def test_a_damaged_chunk_is_made_again(whole_store, tmp_path):
         receipt = {name: hashes[name] for name in writer.chunk_files(info, index)}
         path = out / writer.PROGRESS / f"chunk-{index:06d}.json"
         write_document(path, schema.Listing(files=receipt))
-    (out / schema.ARRAYS / "truth" / "c" / "2" / "0" / "0" / "0").write_bytes(b"x")
+    edited = out / schema.ARRAYS / "truth" / "c" / "2" / "0" / "0" / "0"
+    edited.write_bytes(b"x")
     (out / schema.ARRAYS / "truth" / "c" / "1" / "0" / "0" / "0").unlink()
     (out / schema.ARRAYS / "truth" / "c" / "3.0.partial").write_bytes(b"x")
+    with pytest.raises(BadInput, match=r"c/2/0/0/0: seal: the file was edited"):
+        generate(small(), out)
+    edited.unlink()
     assert writer.missing_chunks(out, info) == [1, 2]
     generate(small(), out)
     assert_same_files(out, whole_store)

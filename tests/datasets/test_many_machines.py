@@ -87,8 +87,11 @@ def test_a_changed_chunk_of_a_shard_is_named(whole_store, tmp_path):
     path = out / schema.ARRAYS / "truth" / "c" / "1" / "0" / "0" / "0"
     before = path.read_bytes()
     path.write_bytes(b"x")
-    with pytest.raises(BadInput, match="truth/c/1/0/0/0: was changed"):
-        generate(small(), out)
+    for again in (None, Shard(2, 6)):
+        with pytest.raises(
+            BadInput, match="truth/c/1/0/0/0: seal: .*edited. Delete it"
+        ):
+            generate_share(small(), out, again) if again else generate(small(), out)
     with pytest.raises(RunConflict, match="seed is 0, not 1"):
         generate_share(small(seed=1), out, Shard(1, 6))
     path.write_bytes(before)

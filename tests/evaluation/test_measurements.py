@@ -5,6 +5,7 @@ import lzma
 import msgspec
 import numpy as np
 import pytest
+import xarray as xr
 
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.joining import add_models, join, pool_trainings
@@ -99,6 +100,23 @@ def test_headers_that_do_not_fit_are_refused():
         type(one)(one.data, same)
     with pytest.raises(ValueError, match="condition must be below 0"):
         type(one)(one.data, msgspec.structs.replace(one.header, conditions=()))
+
+
+def test_edited_measurements_are_refused(tmp_path):
+    path, packed = tmp_path / "a.nc", tmp_path / "a.nc.xz"
+    measured().write(path)
+    with xr.open_dataset(path, engine="scipy") as opened:
+        edited = opened.load() * 1
+    edited["pos_mm"] *= 0.1
+    attributes = opened.attrs
+    for kept in (attributes, {"header": attributes["header"]}):
+        edited.attrs = kept
+        data = edited.to_netcdf(engine="scipy")
+        path.write_bytes(bytes(data))
+        with pytest.raises(BadInput, match=r"a\.nc: seal: .*edited.* Delete it"):
+            read_measurements(path)
+        packed.write_bytes(lzma.compress(bytes(data)))
+    read_measurements(packed)  # evidence of earlier versions has no seal
 
 
 def test_hostile_files_get_one_line(tmp_path):

@@ -3,6 +3,8 @@
 import json
 
 import pytest
+from safetensors import safe_open
+from safetensors.numpy import load_file, save_file
 
 from learning.stores import quiet_store
 from sainet.cli.entry import run
@@ -59,7 +61,7 @@ def test_bad_shards_end_in_one_line(words, tmp_path, capsys):
     (file,) = files(tmp_path)
     file.write_bytes(b"x")
     assert run(there) == 2
-    assert ".safetensors: was changed after a shard" in capsys.readouterr().err
+    assert ".safetensors: truncated" in capsys.readouterr().err
 
 
 def test_a_damaged_part_is_named(words, tmp_path, capsys):
@@ -69,3 +71,20 @@ def test_a_damaged_part_is_named(words, tmp_path, capsys):
     capsys.readouterr()
     assert run(there) == 2
     assert "delete it, then run the same command again" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("keeps_seal", [True, False])
+def test_an_edited_part_is_refused(words, tmp_path, capsys, keeps_seal):
+    there = [*words, "--out", str(tmp_path)]
+    assert run(there) == 0
+    path = files(tmp_path)[0]
+    with safe_open(path, "numpy") as file:
+        metadata = file.metadata() if keeps_seal else None
+    smaller = {name: 0.1 * values for name, values in load_file(path).items()}
+    save_file(smaller, path, metadata)
+    capsys.readouterr()
+    assert run(there) == 2
+    error = capsys.readouterr().err
+    assert f"{path}: seal: " in error
+    assert "Delete it, then run the same command again" in error
+    assert error.count("\n") == 1

@@ -31,6 +31,7 @@ from sainet.identification.residuals import Scale, intervals, residuals, samples
 from sainet.models.card import IDENTIFIED, read_identified
 from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.errors import BadInput, BadStore, RunConflict
+from support import write_sealed
 
 OFFSET = {"camera_x_mm": 0.8, "camera_y_mm": -0.5}
 TRUE = {"pusher_friction": 0.17, "pressure_radius_ratio": 0.5, **OFFSET}
@@ -239,6 +240,9 @@ def found_with(*, friction=0.3, ratio=0.5, camera=None, pushes=3, engine=None) -
 def test_a_damaged_file_is_named(tmp_path, text, says):
     (tmp_path / IDENTIFIED).write_text(text.replace('"%s"', "1" + "0" * 400))
     if says is None:
+        with pytest.raises(BadInput, match="seal: missing"):
+            read_identified(tmp_path)
+        write_sealed(tmp_path / IDENTIFIED, json.loads(text))
         read_identified(tmp_path)
         return
     with pytest.raises(BadInput, match=rf"{IDENTIFIED}: .*{says}.* Delete ") as raised:

@@ -7,18 +7,26 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from msgspec import structs
+from safetensors.numpy import save
 
 from models.samples import CARD as SAMPLE
 from models.samples import network
 from sainet.engines.simulator import PAPER, PlanarSpec
 from sainet.models.card import CARD, WEIGHTS, read_card
-from sainet.models.checkpoint import load_arrays, load_network, save_arrays
+from sainet.models.checkpoint import (
+    load_arrays,
+    load_network,
+    read_arrays,
+    save_arrays,
+    write_arrays,
+)
 from sainet.models.dynamics import LearnedDynamics, PhysicsDynamics, SimulatorAugmented
 from sainet.models.identity import ModelId
 from sainet.models.library import PHYSICS, load_model
 from sainet.runs.documents import content_hash, write_document, write_json
-from sainet.runs.errors import BadCheckpoint, UnknownName
+from sainet.runs.errors import BadCheckpoint, BadInput, UnknownName
 from sainet.scenes.scene import TIME_STEP
+from support import write_sealed
 
 
 def write_network(folder, model="sain", kind="robot", seed=0):
@@ -43,7 +51,7 @@ def folder(tmp_path):
 
 def edit_card(folder, **changes):
     card = json.loads((folder / CARD).read_text())
-    write_json(folder / CARD, card | changes)
+    write_sealed(folder / CARD, card | changes)
 
 
 def edit_simulator(folder, **changes):
@@ -143,11 +151,9 @@ BAD_FIELDS = {
 )
 def test_a_card_with_a_bad_field_names_it(folder, name, value):
     card = json.loads((folder / CARD).read_text()) | {name: value}
-    (folder / CARD).write_text(
-        json.dumps(card)
-    )  # infinity too, which ours never writes
-    # A card of the other setup: it is the weights that then do not fit.
-    fits_not = value == "direct-force"
+    write_sealed(folder / CARD, card)
+    # A card of the other setup, or with another hash: the weights then do not fit.
+    fits_not = value in ("direct-force", "0" * 64)
     wanted = WEIGHTS if fits_not else f"{CARD}.*{name}"
     with pytest.raises(BadCheckpoint, match=wanted) as raised:
         load_model(str(folder))
@@ -205,7 +211,7 @@ def test_a_camera_that_cannot_be_is_refused(folder, offset):
 def test_a_card_that_lacks_a_field_names_it(folder, name):
     card = json.loads((folder / CARD).read_text())
     del card[name]
-    write_json(folder / CARD, card)
+    write_sealed(folder / CARD, card)
     with pytest.raises(BadCheckpoint, match=rf"{CARD}: .*`{name}`"):
         read_card(folder)
 
@@ -261,10 +267,35 @@ def test_impossible_weights_are_named(folder, change, says):
 
 def test_other_weights_than_the_cards_are_refused(folder):
     save_arrays(folder / WEIGHTS, network("sain", "robot", seed=1))
-    with pytest.raises(
-        BadCheckpoint, match=rf"{CARD}: weights .*do not belong together"
-    ):
+    with pytest.raises(BadCheckpoint, match=rf"{WEIGHTS}: .*do not belong together"):
         load_network(folder)
+
+
+def test_an_edited_card_is_refused(folder):
+    card = json.loads((folder / CARD).read_text())
+    edits = (
+        (card | {"trained_pushes": 9}, "the file was edited"),
+        ({k: v for k, v in card.items() if k != "seal"}, "missing: .* earlier sainet"),
+    )
+    for edited, says in edits:
+        write_json(folder / CARD, edited)
+        with pytest.raises(BadCheckpoint, match=rf"{CARD}: seal: {says}.* Train it"):
+            read_card(folder)
+
+
+def test_edited_arrays_are_refused_unless_a_card_has_their_hash(tmp_path):
+    path, array = tmp_path / "arrays", np.arange(3.0)
+    data = write_arrays(path, {"a": array})
+    np.testing.assert_array_equal(read_arrays(path)["a"], array)
+    edits = {
+        "the file was edited": data.replace(array.tobytes(), (array / 9).tobytes()),
+        "missing": save({"a": array}),  # as other programs write it
+    }
+    for says, edited in edits.items():
+        path.write_bytes(edited)
+        with pytest.raises(BadInput, match=f"arrays: seal: {says}.* Delete it, then"):
+            read_arrays(path)
+        assert read_arrays(path, known=content_hash(edited))
 
 
 def test_a_network_is_refused_on_other_pushes(folder):

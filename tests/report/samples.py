@@ -205,8 +205,7 @@ def record_json(pushes=3, **changes):
         "moved": 1,
         "solved": True,
         "reason": "solved",
-        "final_mm": 2.34,
-        "final": [[29.0, 1.0, 2.0], [142.0, 1.0, 2.0]],
+        "final_mm": 2.34 if changes.get("solved", True) else 12.34,
         "goal_mm": [150.0, 0.0],
         "tolerance_mm": 5.9,
         "radius_mm": [54.0, 59.0],
@@ -214,7 +213,10 @@ def record_json(pushes=3, **changes):
         "table_friction": 0.15,
         "decision_s": [0.1] * pushes,
     }
-    return known | changes
+    known |= changes
+    (x, y), away = known["goal_mm"], known["final_mm"]
+    end = [None] * 3 if away is None else [x - away, y, 2.0]
+    return {"final": [[29.0, 1.0, 2.0], end], **known}
 
 
 def lost_record():

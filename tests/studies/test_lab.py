@@ -1,6 +1,7 @@
 """Studies in the virtual lab, tiny; what they count and measure, by hand."""
 
 import json
+import math
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -144,8 +145,11 @@ def episode(*way: float, **changes: object) -> EpisodeRecord:
     made = samples.record_json(pushes=len(way) - 1)
     for step, observed in zip(made["turns"], places(*way), strict=False):
         step["observed"] = observed
-    changes = {"final": places(*way)[-1], "goal_mm": [150.0, 0.0]} | changes
-    return msgspec.convert(made | changes, EpisodeRecord)
+    made |= {"final": places(*way)[-1]} | changes
+    away = math.dist(made["final"][1][:2], made["goal_mm"])
+    # Solved or not, whatever the distance is.
+    made |= {"final_mm": away, "tolerance_mm": 2 * away if made["solved"] else away / 2}
+    return msgspec.convert(made, EpisodeRecord)
 
 
 def test_the_overshoot_is_the_most_that_the_disk_was_beyond_its_goal():
@@ -167,8 +171,8 @@ def test_outcomes_in_labs_have_paired_differences():
     tuned = msgspec.structs.replace(SAIN, data="tuned")
     parts = []
     for lab in range(3):
-        good = [episode(100.0, 149.0, final_mm=1.0, trial=n) for n in range(4)]
-        lost = [replace_record(e, solved=e.trial > lab, final_mm=9.0) for e in good]
+        good = [episode(100.0, 149.0, trial=n) for n in range(4)]
+        lost = [episode(100.0, 141.0, solved=n > lab, trial=n) for n in range(4)]
         measured = measure_trials({SAIN: lost, tuned: good}, Condition(label="hard"))
         parts.append(of_lab(measured, lab))
     found = summarise(join(parts))
@@ -184,10 +188,6 @@ def test_outcomes_in_labs_have_paired_differences():
     assert any(
         "solved: SAIN, tuned minus SAIN +0.500" in s for s in trial_sentences(found)
     )
-
-
-def replace_record(record: EpisodeRecord, **changes: object) -> EpisodeRecord:
-    return msgspec.structs.replace(record, **changes)
 
 
 def test_assumed_properties_follow_swapped_disks_or_stay_in_order():

@@ -16,6 +16,7 @@ from sainet.runs.errors import BadInput
 from sainet.studies.run_report import page_of, report_of
 from sainet.studies.study import TABLE, Result
 from studies.test_simulated_control import result as control_table
+from support import write_sealed
 
 
 def test_a_training_run_has_its_card_and_curve(tmp_path):
@@ -33,9 +34,8 @@ def test_errors_episodes_and_figures_come_together(tmp_path):
     write_json(tmp_path / "config.json", {"command": "control", "seed": 3})
     write_document(tmp_path / TABLE, Result(summary=samples.result()))
     for trial in range(8):
-        write_json(
-            tmp_path / FOLDER / f"{trial:03d}.json", samples.record_json(trial=trial)
-        )
+        path = tmp_path / FOLDER / f"{trial:03d}.json"
+        write_sealed(path, samples.record_json(trial=trial))
     (tmp_path / FOLDER / "008.interrupted.json").write_text("cut sho")
     draw_paths(samples.replay(), tmp_path / "paths.svg")
     (tmp_path / "of-somebody.svg").write_text("<svg onload='alert(1)'/>")
@@ -67,7 +67,7 @@ def test_identified_parameters_are_in_the_report(tmp_path):
     errors = {"before_mm": 2, "after_mm": 1, "before_deg": 5, "after_deg": 4}
     found = {"estimates": estimates, "pushes": 12, **errors}
     found |= {"format_version": 2, "engine": {"simulator": {"engine": "planar"}}}
-    write_json(tmp_path / "identified.json", found)
+    write_sealed(tmp_path / "identified.json", found)
     page = page_of(tmp_path)
     assert "Pusher friction: 0.31 (0.3 to 0.32), initially 0.25." in page
     assert "spin is not identifiable: it never spins." in page
@@ -137,6 +137,14 @@ def test_hostile_and_damaged_files_are_named(name, text, told, tmp_path):
         page_of(tmp_path)
     assert str(tmp_path) in str(error.value)
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_an_edited_table_is_refused(tmp_path):
+    write_document(tmp_path / TABLE, Result(summary=samples.result()))
+    text = (tmp_path / TABLE).read_text()
+    (tmp_path / TABLE).write_text(text.replace("3.6", "0.36", 1))
+    with pytest.raises(BadInput, match=r"table\.json: seal: the file was edited"):
+        report_of(tmp_path)
 
 
 def test_a_folder_of_run_folders_names_one_of_them(tmp_path):

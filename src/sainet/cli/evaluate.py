@@ -142,7 +142,7 @@ class Evaluate:
         with parts.share(shard) as share:
             for model in own:
                 self._evaluate([model], store, parts)
-                share.add(model.name, [parts.file(model.name)])
+                share.add(model.name)
         self.output.say(f"Errors of {len(own)} models of shard {shard}: {self.out}")
         return {"out": str(self.out), "shard": str(shard), "models": len(own)}
 

@@ -58,6 +58,7 @@ class Collected(msgspec.Struct, frozen=True, kw_only=True):
     usable: int  # in the dataset
     arrangements: int  # pushes before which the disks were arranged
     troubles: dict[str, int]  # pushes that are not in the dataset, by reason
+    seal: str = ""  # hash of all other fields
 
 
 def collect(

@@ -16,7 +16,7 @@ from sainet.datasets.recorded.properties import Properties
 from sainet.datasets.recorded.resample import resample
 from sainet.datasets.store import Store
 from sainet.robots.base import AbstractRobot
-from sainet.runs.documents import read_document, write_bytes
+from sainet.runs.documents import read_document, sealed_fields, write_bytes
 from sainet.runs.errors import BadInput
 from sainet.scenes.pushes import Push
 from sainet.scenes.quantities import PUSHER_RADIUS, Finite, Mass, Radius
@@ -88,6 +88,7 @@ class PushDocument(msgspec.Struct, frozen=True, kw_only=True):
     speed_mm_s: Finite | None = None
     plan: str = ""  # equal for repetitions of one push
     trouble: str = ""
+    seal: str = ""  # hash of all other fields
 
     def __post_init__(self) -> None:
         """Check that all samples have a time, a pusher and all disks."""
@@ -156,7 +157,7 @@ class PushDocument(msgspec.Struct, frozen=True, kw_only=True):
 
 def write_push(path: Path, document: PushDocument) -> None:
     """Write a collected push on one line: indented, it would be thrice as long."""
-    write_bytes(path, msgspec.json.encode(document) + b"\n")
+    write_bytes(path, msgspec.json.encode(sealed_fields(document)) + b"\n")
 
 
 def read_push(path: Path) -> PushDocument:

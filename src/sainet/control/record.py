@@ -1,5 +1,6 @@
 """Records of episodes: decision, prediction and measured poses of every push."""
 
+import functools
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -24,6 +25,7 @@ FOLDER = "episodes"
 _EVERY = 8  # steps between the recorded poses of a path: 1/30 s
 
 _LEAST_MM = 1e-6  # length of a way
+_agree = functools.partial(math.isclose, rel_tol=1e-5, abs_tol=0.05)  # mm
 _NO_NEARER = 10  # pushes
 
 # In mm and degrees. None: the simulation produced NaN or infinity.
@@ -79,6 +81,7 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
     tolerance_mm: _Positive
     table_friction: quantities.Friction
     steps: list[StepRecord] = msgspec.field(name="turns")
+    seal: str = ""  # hash of all other fields
 
     @property
     def overshoot_mm(self) -> float:
@@ -97,6 +100,19 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
         away[~np.isfinite(away)] = np.inf
         return not self.solved and int(np.argmin(away)) + _NO_NEARER < len(away)
 
+    def _check_end(self) -> None:
+        """Raise `ValueError` if pose, distance, tolerance and outcome contradict."""
+        end = [math.inf if x is None else x for x in self.final[self.moved][:2]]
+        away = math.inf if self.final_mm is None else self.final_mm
+        if not _agree(away, math.dist(end, self.goal_mm)):
+            raise ValueError(f"final_mm is {away:g}, but final is elsewhere")
+        most = self.tolerance_mm
+        if self.solved != (away < most) and not _agree(away, most):
+            raise ValueError(
+                f"solved is {self.solved}, but final_mm is {away:g} and tolerance_mm "
+                f"{most:g}"
+            )
+
     @property
     def _path(self) -> Float[np.ndarray, "observation 2"]:
         """Places of the target disk (mm) before each push, and at the end."""
@@ -111,6 +127,7 @@ class EpisodeRecord(msgspec.Struct, kw_only=True):
             raise ValueError(f"moved is {self.moved} of {disks} disks")
         if len(self.final) != disks:
             raise ValueError(f"final has {len(self.final)} of {disks} disks")
+        self._check_end()
         for index, step in enumerate(self.steps):
             paths = [step.observed, *step.planned, *step.actual]
             if {len(poses) for poses in paths} != {disks}:
@@ -123,6 +140,7 @@ class Finished(msgspec.Struct):
     """The files of a finished run, relative to its folder; written last."""
 
     episodes: list[str]
+    seal: str = ""  # hash of all other fields
 
 
 def record(

@@ -140,7 +140,7 @@ def run_share(
         for index in chain(known, each_done(executor, run_trial, missing)):
             path = episode_file(out, index)
             on_episode(read_record(path))
-            share.add(f"episode {index}", [path])
+            share.add(f"episode {index}")
     return len(own)
 
 

@@ -15,7 +15,7 @@ from sainet.datasets.store import Store, open_store
 from sainet.runs import documents
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import open_run
-from sainet.runs.shards import Collected, Shard, check_files, collect, open_share
+from sainet.runs.shards import Collected, Shard, collect, open_share
 from sainet.runs.workers import each_done
 
 PROGRESS = "progress"
@@ -144,8 +144,6 @@ def _write(
 ) -> None:
     """Write the missing chunks, then the list of all hashes, which completes it."""
     _create_arrays(folder, info)
-    if shards is not None:
-        _check_unchanged(folder, info)
     missing = missing_chunks(folder, info)
     if shards is not None:
         shards.tell(len(missing), info.chunks)
@@ -163,14 +161,6 @@ def _write(
         shards.clear()
     documents.write_document(folder / schema.HASHES, schema.Listing(files=hashes))
     _clear_progress(folder)
-
-
-def _check_unchanged(folder: Path, info: schema.StoreInfo) -> None:
-    """Raise `BadInput` for a chunk that was changed after its receipt was written."""
-    for index in range(info.chunks):
-        if (path := _receipt(folder, index)).is_file():
-            files = documents.read_document(path, schema.Listing).files
-            check_files(folder / schema.ARRAYS, files)
 
 
 def _create_arrays(folder: Path, info: schema.StoreInfo) -> None:
@@ -239,8 +229,11 @@ def chunk_files(info: schema.StoreInfo, index: int) -> list[str]:
 def missing_chunks(folder: Path, info: schema.StoreInfo) -> list[int]:
     """Return the chunks that are not written yet.
 
-    A chunk is complete if its receipt exists and its files match the receipt.
-    Remains of an interrupted writer are removed.
+    A chunk is complete if its receipt and all its files exist. Remains of an
+    interrupted writer are removed.
+
+    Raises:
+        BadInput: a file was changed after the receipt was written.
     """
     for leftover in (folder / schema.ARRAYS).rglob("*.partial"):
         leftover.unlink(missing_ok=True)
@@ -253,11 +246,11 @@ def _is_written(folder: Path, info: schema.StoreInfo, index: int) -> bool:
     except BadInput:
         return False
     paths = {name: folder / schema.ARRAYS / name for name in chunk_files(info, index)}
-    return all(
-        path.is_file()
-        and documents.content_hash(path.read_bytes()) == receipt.get(name)
-        for name, path in paths.items()
-    )
+    is_complete = all(path.is_file() for path in paths.values())
+    for name, path in paths.items() if is_complete else ():
+        found = documents.content_hash(path.read_bytes())
+        documents.check_seal(path, found, receipt.get(name, ""))
+    return is_complete
 
 
 def _receipt(folder: Path, index: int) -> Path:

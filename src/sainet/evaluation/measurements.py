@@ -17,7 +17,14 @@ import numpy as np
 import xarray as xr
 
 from sainet.models.identity import ModelId
-from sainet.runs.documents import read_file, write_bytes
+from sainet.runs.documents import (
+    UNSEALED,
+    check_seal,
+    read_file,
+    seal_of,
+    sealed,
+    write_bytes,
+)
 from sainet.runs.errors import BadInput
 from sainet.runs.manifest import Manifest, manifest
 
@@ -35,7 +42,7 @@ DIMENSIONS = {
 }
 _COORDINATES = ("condition", "fold", "row")
 _LARGEST = 256 << 20  # bytes of a file, once it is unpacked
-_HEADER = "header"
+_HEADER, _SEAL = "header", "seal"
 _BITS = 14  # of the mantissa, in published measurements: a relative error below 1e-4
 # Values of four bytes: the byte that a value has at its place predicts the next one.
 _FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 9, "lc": 0, "lp": 2, "pb": 2}]
@@ -224,8 +231,9 @@ class Measurements:
         names = sorted(str(name) for name in self.data.variables)
         parts = {n: (self.data[n].dims, self.data[n].values) for n in names}
         header = msgspec.json.encode(self.header).decode()
-        data = xr.Dataset(parts, attrs={_HEADER: header}).set_coords([*_COORDINATES])
-        return bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
+        attributes = {_HEADER: header, _SEAL: UNSEALED}
+        data = xr.Dataset(parts, attrs=attributes).set_coords([*_COORDINATES])
+        return sealed(bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
 
     def write(self, path: Path) -> None:
         """Write the file, compressed if the name ends in ``.xz``."""
@@ -263,18 +271,21 @@ def read_measurements(path: Path) -> Measurements:
     """Read a file of measurements.
 
     Raises:
-        BadInput: it is missing, damaged or no such file, in one line.
+        BadInput: it is missing, damaged, edited or no such file, in one line.
     """
     packed = read_file(path, most=_LARGEST)
     try:
         data = _unpack(packed) if path.suffix == ".xz" else packed
         with xr.open_dataset(io.BytesIO(data), engine="scipy") as opened:
             dataset = opened.load()
-        header = dataset.attrs.pop(_HEADER)
-        return Measurements(dataset, msgspec.json.decode(header, type=Header))
+        header, seal = dataset.attrs.pop(_HEADER), dataset.attrs.pop(_SEAL, "")
+        found = Measurements(dataset, msgspec.json.decode(header, type=Header))
     except Exception as cause:  # SciPy raises arbitrary exceptions on corrupt files
         reason = " ".join(str(cause).split())[:200] or type(cause).__name__
         raise BadInput(f"{path}: no measurements ({reason}); {_REMEDY}.") from None
+    if seal or path.suffix != ".xz":  # evidence of earlier versions has none
+        check_seal(path, seal, seal_of(data, seal))
+    return found
 
 
 def _unpack(packed: bytes) -> bytes:

@@ -6,18 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from safetensors import SafetensorError
-from safetensors.numpy import load, save
 
 from sainet.datasets.store import Store
 from sainet.evaluation.metrics import Errors
+from sainet.models.checkpoint import read_arrays, write_arrays
 from sainet.models.model import Model
-from sainet.runs.documents import content_hash, read_file, write_bytes
-from sainet.runs.errors import BadInput
+from sainet.runs.documents import content_hash
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.shards import Collected, Shard, Share, collect, open_share
-
-_LARGEST = 1 << 32  # bytes
 
 
 @dataclass(frozen=True)
@@ -64,19 +60,13 @@ class Parts:
         """Return the errors of a model, measured unless they are there.
 
         Raises:
-            BadInput: the file cannot be read.
+            BadInput: the file is damaged or was edited.
         """
         path = self.file(model)
         if not path.is_file():
             found = {k: np.ascontiguousarray(v) for k, v in measure().items()}
-            write_bytes(path, save(found))
-        try:
-            return load(read_file(path, most=_LARGEST))
-        except SafetensorError as error:
-            raise BadInput(
-                f"{path}: cannot be read ({error}); delete it, then run the same "
-                "command again."
-            ) from None
+            write_arrays(path, found)
+        return read_arrays(path)
 
     def share(self, shard: Shard) -> AbstractContextManager[Share]:
         """Return the share of a shard: see `open_share`."""

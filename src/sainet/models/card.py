@@ -80,6 +80,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     manifest: Manifest
     final_loss: float | None = None
     format_version: Literal[3] = 3
+    seal: str = ""  # hash of all other fields
 
     def __post_init__(self) -> None:
         """Refuse identities that no network can have."""
@@ -128,7 +129,7 @@ def read_card(folder: Path) -> Card:
     return read_document(path, Card, error=BadCheckpoint, remedy="train it again")
 
 
-_INTERNAL = ("digests", "engine", "format_version", "groups")
+_INTERNAL = ("digests", "engine", "format_version", "groups", "seal")
 
 
 class Estimate(msgspec.Struct, frozen=True):
@@ -159,6 +160,7 @@ class Identified(msgspec.Struct, frozen=True, kw_only=True):
     digests: str = ""  # of the pushes (`runs.digests`); empty: of an earlier version
     groups: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET  # of recorded pushes
     format_version: Literal[2] = 2
+    seal: str = ""  # hash of all other fields
 
     def to_json(self) -> dict[str, object]:
         """Return the estimates as JSON values, sorted by name."""

@@ -1,5 +1,6 @@
 """Trained networks on disk: arrays, and the checks that weights and card fit."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import msgspec
 import numpy as np
 from jaxtyping import PRNGKeyArray
 
-from sainet.models.card import CARD, WEIGHTS, Card, read_card
+from sainet.models.card import WEIGHTS, Card, read_card
 from sainet.models.contacts import ContactFeatures
 from sainet.models.correctors.contact import HOLD, ContactNetwork
 from sainet.models.correctors.feedforward import (
@@ -23,43 +24,101 @@ from sainet.models.correctors.network import AbstractNetwork, Scales
 from sainet.models.features import AbstractFeatures, FeatureSet, feature_set
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 from sainet.models.nominal import NominalFeatures
-from sainet.runs.documents import content_hash, read_file, write_bytes
-from sainet.runs.errors import BadCheckpoint
+from sainet.runs.documents import (
+    AGAIN,
+    UNSEALED,
+    check_seal,
+    content_hash,
+    read_file,
+    seal_of,
+    sealed,
+    write_bytes,
+)
+from sainet.runs.errors import BadCheckpoint, BadInput
 
-_LARGEST = 1 << 30  # bytes of a file
+_LARGEST = 1 << 32  # bytes of a file
 
 
 def save_arrays(path: Path, tree: Any) -> bytes:  # noqa: ANN401
     """Write all arrays of a tree atomically; returns what was written."""
-    from safetensors.numpy import save
-
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
     # Not ascontiguousarray: it makes a scalar an array of one.
     named = {
         jax.tree_util.keystr(where): np.asarray(leaf, order="C")
         for where, leaf in leaves
     }
-    data = save(named)
+    return write_arrays(path, named)
+
+
+def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Write named arrays atomically, sealed; returns what was written."""
+    from safetensors.numpy import save
+
+    data = sealed(save({**arrays}, {"seal": UNSEALED}))
     write_bytes(path, data)
     return data
 
 
-def load_arrays(path: Path, like: Any) -> Any:  # noqa: ANN401
-    """Read a tree of arrays that is shaped like another, of arrays or their shapes.
+def read_arrays(
+    path: Path,
+    error: type[BadInput] = BadInput,
+    remedy: str = AGAIN,
+    *,
+    known: str | None = None,
+) -> dict[str, np.ndarray]:
+    """Read named arrays.
+
+    Args:
+        path: of the file.
+        error: to raise.
+        remedy: what the user can do, without a full stop.
+        known: hash of the file in a card; None: the file has a seal.
 
     Raises:
-        BadCheckpoint: the file is missing or damaged, or an array does not fit.
+        BadInput: or the given subclass: the file is missing, damaged or edited.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
+    data = read_file(path, most=_LARGEST, error=error)
     try:
-        found = load(read_file(path, most=_LARGEST, error=BadCheckpoint))
-    except (SafetensorError, ValueError, KeyError) as error:
-        raise BadCheckpoint(
-            f"{path}: truncated or no safetensors file ({str(error).splitlines()[0]}); "
-            "train the network again."
+        found = load(data)
+    except (SafetensorError, ValueError, KeyError) as cause:
+        raise error(
+            f"{path}: truncated or no safetensors file ({str(cause).splitlines()[0]}); "
+            f"{remedy}."
         ) from None
+    if known is None:
+        header = msgspec.json.decode(data[8 : 8 + int.from_bytes(data[:8], "little")])
+        seal = header.get("__metadata__", {}).get("seal")
+        check_seal(path, seal, seal_of(data, seal or ""), error=error, remedy=remedy)
+    elif content_hash(data) != known:
+        raise error(
+            f"{path}: its hash is another than `weights` of the card; the two do not "
+            f"belong together, {remedy}."
+        )
+    return found
+
+
+def load_arrays(
+    path: Path,
+    like: Any,  # noqa: ANN401
+    remedy: str = AGAIN,
+    *,
+    known: str | None = None,
+) -> Any:  # noqa: ANN401
+    """Read a tree of arrays that is shaped like another, of arrays or their shapes.
+
+    Args:
+        path: of the file.
+        like: the other tree.
+        remedy: see `read_arrays`.
+        known: see `read_arrays`.
+
+    Raises:
+        BadCheckpoint: the file is missing or damaged, or an array does not fit.
+    """
+    found = read_arrays(path, BadCheckpoint, remedy, known=known)
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)
     return jax.tree.unflatten(
         structure, [_take(path, found, where, leaf) for where, leaf in leaves]
@@ -103,13 +162,8 @@ def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
     hold = card.recipe.hold
     hold = 1 if hold is msgspec.UNSET else hold
     network = untrained(features, card.time_step, integrator, hold)
-    loaded = load_arrays(folder / WEIGHTS, network)
-    if content_hash(read_file(folder / WEIGHTS, error=BadCheckpoint)) != card.weights:
-        raise BadCheckpoint(
-            f"{folder / CARD}: weights is another hash than that of "
-            f"{WEIGHTS}; the two do not belong together, train the network again."
-        )
-    return loaded, card
+    again = "train the network again"
+    return load_arrays(folder / WEIGHTS, network, again, known=card.weights), card
 
 
 def features_of(

@@ -17,6 +17,8 @@ from sainet.runs.errors import BadInput, shown
 
 LARGEST_DOCUMENT = 64 << 20  # bytes
 _LONGEST_REASON = 200  # characters of a message that quote a file
+UNSEALED = 8 * "unsealed"  # in the place of the seal, before a file is sealed
+AGAIN = "delete it, then run the same command again"
 T = TypeVar("T")
 
 
@@ -178,17 +180,21 @@ def read_document(
         BadInput: or the given subclass, in one line with file, field and remedy.
     """
     data = read_file(path, error=error)
-    advice = f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
     try:
         _check_version(path, data, kind, error)
         found = decode(data, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
-        raise error(f"{path}: {_reason(cause)}.{advice}") from None
+        raise error(f"{path}: {_reason(cause)}.{_sentence(remedy)}") from None
     if _has_seal(kind):
         fields = msgspec.json.decode(data)
-        if fields.get("seal") != _seal_of(fields):
-            raise error(f"{path}: seal: the file was edited.{advice}")
+        seal, wanted = fields.get("seal"), _seal_of(fields)
+        check_seal(path, seal, wanted, error=error, remedy=remedy)
+        found = msgspec.structs.replace(found, seal="")  # of the file, not the value
     return found
+
+
+def _sentence(remedy: str) -> str:
+    return f" {remedy[:1].upper()}{remedy[1:]}." if remedy else ""
 
 
 def write_document(path: Path, document: msgspec.Struct) -> None:
@@ -196,11 +202,16 @@ def write_document(path: Path, document: msgspec.Struct) -> None:
 
     A field `seal` becomes the hash of all others, which `read_document` checks.
     """
+    write_json(path, sealed_fields(document))
+
+
+def sealed_fields(document: msgspec.Struct) -> dict[str, Any]:
+    """Return the fields of a struct as JSON values; the field `seal` is filled."""
     # By way of builtins: msgspec would write NaN as null.
     fields = msgspec.to_builtins(document, order="sorted")
     if _has_seal(type(document)):
         fields["seal"] = _seal_of(fields)
-    write_json(path, fields)
+    return fields
 
 
 def _has_seal(kind: type) -> bool:
@@ -211,6 +222,35 @@ def _seal_of(fields: Mapping[str, object]) -> str:
     """Return the hash of all fields except the seal itself."""
     others = {name: value for name, value in fields.items() if name != "seal"}
     return content_hash(to_json(others).encode())
+
+
+def sealed(data: bytes) -> bytes:
+    """Return a file with its hash in the place of `UNSEALED`, which it contains."""
+    return data.replace(UNSEALED.encode(), content_hash(data).encode(), 1)
+
+
+def seal_of(data: bytes, seal: str) -> str:
+    """Return what the seal of a file must be, by its content without this seal."""
+    return content_hash(data.replace(seal.encode(), UNSEALED.encode(), 1))
+
+
+def check_seal(
+    path: Path,
+    found: str | None,
+    wanted: str,
+    *,
+    error: type[BadInput] = BadInput,
+    remedy: str = AGAIN,
+) -> None:
+    """Raise unless a file has the seal that it must have.
+
+    Raises:
+        BadInput: or the given subclass: it was edited, or has no seal.
+    """
+    if found != wanted:
+        edited = "the file was edited"
+        why = edited if found else f"missing: {edited}, or is of an earlier sainet"
+        raise error(f"{path}: seal: {why}.{_sentence(remedy)}")
 
 
 def checked(document: T, where: object) -> T:

@@ -1,34 +1,28 @@
 """Shares of a run: independent pieces divided among commands that share a folder.
 
 Each command with a shard does its share of the pieces, in the folder that all share,
-and lists them with their hashes in ``shards/``. The same command without a shard
-checks them, does what is missing and removes the lists: the folder is then as one
-command alone would have made it.
+and lists them in ``shards/``. The same command without a shard does what is missing and
+removes the lists: the folder is then as one command alone would have made it. Every
+piece contains its own hash, so that edited ones are refused.
 """
 
 import logging
 import re
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import msgspec
 
-from sainet.runs.documents import (
-    content_hash,
-    read_document,
-    read_file,
-    write_document,
-)
-from sainet.runs.errors import BadInput, BadSetting, RunConflict
+from sainet.runs.documents import read_document, write_document
+from sainet.runs.errors import BadSetting, RunConflict
 from sainet.runs.folders import RunFolder, open_run
 from sainet.runs.manifest import MANIFEST, Manifest, code_versions
 
 SHARDS = "shards"
 _MOST_SHARDS = 100_000
-_LARGEST_FILE = 1 << 34  # bytes
 _log = logging.getLogger(__name__)
 
 
@@ -68,9 +62,10 @@ class Shard:
 
 
 class Pieces(msgspec.Struct, frozen=True):
-    """What a shard has finished: files of each piece, and their SHA-256."""
+    """What a shard has finished."""
 
-    files: dict[str, dict[str, str]]  # by the name of the piece; paths in the folder
+    names: list[str]
+    seal: str = ""  # hash of all other fields
 
 
 @dataclass
@@ -79,21 +74,17 @@ class Share:
 
     out: Path
     shard: Shard
-    pieces: dict[str, dict[str, str]]
     _folder: RunFolder = field(repr=False)  # keeps its lock
 
-    def add(self, piece: str, files: Iterable[Path]) -> None:
-        """List a finished piece: a later change of its files is noticed."""
-        self.pieces[piece] = {
-            path.relative_to(self.out).as_posix(): _hash(path) for path in files
-        }
-        write_document(_list(self.out, self.shard), Pieces(self.pieces))
+    def add(self, *pieces: str) -> None:
+        """List finished pieces, by their names."""
+        path = _list(self.out, self.shard)
+        known = _read(path).names if path.exists() else ()
+        write_document(path, Pieces(list(dict.fromkeys((*known, *pieces)))))
 
     def finished(self) -> frozenset[str]:
         """Return the names of the pieces that any shard has finished by now."""
-        return frozenset(
-            name for path in _lists(self.out) for name in _read(path).files
-        )
+        return _finished(self.out)
 
 
 @contextmanager
@@ -110,23 +101,17 @@ def open_share(
     Raises:
         RunConflict: the folder has shards of other settings or versions, or a command
             without a shard is at work there.
-        BadInput: a file was changed after this shard had finished it.
     """
     folder = open_run(out / SHARDS, settings, finished_by="", shared=True)
     _check_versions(folder.path)
-    path = _list(out, shard)
-    pieces = _read(path).files if path.exists() else {}
-    for files in pieces.values():
-        check_files(out, files)
-    share = Share(out, shard, dict(pieces), folder)
-    if not path.exists():
-        write_document(path, Pieces(share.pieces))
+    share = Share(out, shard, folder)
+    share.add()
     yield share
 
 
 @dataclass
 class Collected:
-    """The pieces that shards have finished, as far as their files are unchanged."""
+    """The pieces that shards have finished."""
 
     out: Path
     pieces: frozenset[str]
@@ -151,43 +136,16 @@ def collect(out: Path, settings: Mapping[str, object]) -> Collected | None:
 
     Raises:
         RunConflict: the shards have other settings or versions, or one is at work.
-        BadInput: a file was changed after a shard had finished it.
     """
     if not (out / SHARDS).is_dir():
         return None
     folder = open_run(out / SHARDS, settings, finished_by="")
     _check_versions(folder.path)
-    lists = _lists(out)
-    pieces: set[str] = set()
-    for path in lists:
-        for piece, files in _read(path).files.items():
-            check_files(out, files)
-            pieces.add(piece)
-    return Collected(out, frozenset(pieces), len(lists), folder)
+    return Collected(out, _finished(out), len(_lists(out)), folder)
 
 
-def check_files(out: Path, files: Mapping[str, str]) -> None:
-    """Raise unless files are as they were when a shard finished them.
-
-    Raises:
-        BadInput: one was changed or removed.
-    """
-    for name, digest in files.items():
-        path = out / name
-        if not path.is_file() or _hash(path) != digest:
-            raise BadInput(
-                f"{path}: was changed after a shard had finished it; restore it, or "
-                f"delete {out}, then run all shards again."
-            )
-
-
-def files_in(folder: Path, without: Sequence[str] = ()) -> list[Path]:
-    """Return all files of a finished piece, but those in subfolders of some names."""
-    return sorted(
-        path
-        for path in folder.rglob("*")
-        if path.is_file() and not set(path.relative_to(folder).parts) & set(without)
-    )
+def _finished(out: Path) -> frozenset[str]:
+    return frozenset(name for path in _lists(out) for name in _read(path).names)
 
 
 def _check_versions(folder: Path) -> None:
@@ -216,7 +174,3 @@ def _lists(out: Path) -> list[Path]:
 def _read(path: Path) -> Pieces:
     remedy = "delete it, then run this shard again"
     return read_document(path, Pieces, error=RunConflict, remedy=remedy)
-
-
-def _hash(path: Path) -> str:
-    return content_hash(read_file(path, most=_LARGEST_FILE))

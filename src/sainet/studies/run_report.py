@@ -43,7 +43,8 @@ def report_of(folder: Path) -> Report:
     found = folder / TABLE
     table = read_document(found, Result).summary if found.is_file() else None
     card = msgspec.to_builtins(read_any_card(folder)) or {}
-    card.pop("pushes", None)  # hashes, which no reader compares
+    for name in ("pushes", "seal"):  # hashes, which no reader compares
+        card.pop(name, None)
     is_identified = (folder / IDENTIFIED).is_file()
     estimates = _estimates(read_identified(folder)) if is_identified else ()
     sentences = (*sentences_of(folder), *estimates)

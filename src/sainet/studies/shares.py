@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sainet.datasets.schema import ARRAYS
-from sainet.runs.shards import Shard, Share, collect, files_in, open_share
+from sainet.runs.shards import Shard, Share, collect, open_share
 from sainet.studies.durations import Clock
 from sainet.studies.runner import Runner, all_steps
 from sainet.studies.steps import Step
@@ -112,9 +111,7 @@ def run_share(
     with open_share(out, settings, shard) as share:
         while ready := _ready(own, share):
             runner.result(Several(tuple(ready)))
-            for step in ready:
-                files = files_in(runner.folder(step), without=(ARRAYS,))
-                share.add(step.folder_name, files)
+            share.add(*(step.folder_name for step in ready))
         finished = share.finished()
     done = sum(step.folder_name in finished for step in own)
     return Shared(done, len(own) - done)
@@ -135,11 +132,10 @@ def _ready(own: Iterable[Step[Any]], share: Share) -> list[Step[Any]]:
 def collected(
     lasts: Iterable[Step[Any]], out: Path, settings: Mapping[str, object]
 ) -> Iterator[None]:
-    """Check what shards have finished, if any; the body makes what is missing.
+    """Tell what shards have finished, if any; the body makes what is missing.
 
     Raises:
         RunConflict: the shards have other settings or versions, or one is at work.
-        BadInput: a file was changed after a shard had finished it.
     """
     shards = collect(out, settings)
     if shards is not None:

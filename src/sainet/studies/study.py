@@ -80,6 +80,7 @@ class Result(msgspec.Struct, frozen=True, kw_only=True):
     as_trained: Summary | None = None  # of pushes like those of the training
     choices: tuple[Choice, ...] = ()
     claims: tuple[Ruling, ...] = ()
+    seal: str = ""  # hash of all other fields
 
     def to_json(self) -> Mapping[str, object]:
         """Return the JSON object that commands print."""
