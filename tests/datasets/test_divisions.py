@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from learning.stores import info_of, made_up, write
-from sainet.datasets.folds import BLOCKED, SCHEMES, folds_by
+from sainet.datasets import Scheme
+from sainet.datasets.folds import BLOCKED, folds_by
 from sainet.datasets.splits import linked
 from sainet.runs.errors import BadStore
 
@@ -70,7 +71,7 @@ def test_a_part_has_the_kinds_of_the_whole_and_blocks_of_its_own(spread_out):
     assert sizes.min() >= len(rows) // FOLDS
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", get_args(Scheme))
 def test_too_few_pushes_are_refused(spread_out, scheme):
     store, _ = spread_out
     with pytest.raises(BadStore, match=rf"2 pushes.*by {scheme}.*fewer folds"):

@@ -7,8 +7,9 @@ import pytest
 
 from models.test_checkpoint import edit_card, edit_simulator, write_network
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.engines.simulator import TRUE_PROPERTIES
 from sainet.models.card import CARD
-from sainet.models.dynamics import SimulatorAugmented
+from sainet.models.dynamics import LearnedDynamics, SimulatorAugmented
 from sainet.models.library import PRETRAINED, SHIPPED, load_model, shipped_for
 from sainet.runs.errors import BadCheckpoint, MissingExtra
 from sainet.scenes.scene import TIME_STEP
@@ -52,12 +53,16 @@ def test_a_network_keeps_its_engine_unless_it_is_forced(folder):
 
 def test_an_engine_with_true_properties_is_the_same_engine(folder):
     edit_simulator(folder, assumptions={"table_friction": 0.15})
-    load_model(str(folder), engine="planar")
+    loaded = load_model(str(folder), engine="planar").dynamics
+    assert isinstance(loaded, SimulatorAugmented)
+    assert loaded.engine.assumptions == TRUE_PROPERTIES
 
 
 def test_a_network_without_an_engine_fits_any_engine(tmp_path):
     plain = write_network(tmp_path / "plain", "in")
-    load_model(str(plain), engine="bullet")
+    loaded = load_model(str(plain), engine="bullet")
+    assert isinstance(loaded.dynamics, LearnedDynamics)
+    assert loaded.internal is None
 
 
 def test_without_bullet_its_network_names_the_extra(folder, monkeypatch):

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Float
 
 from sainet.identification.adaptation import Adaptation
 from sainet.models.library import Loadable, as_model
@@ -162,12 +161,3 @@ def _out_of_pushes(
 def _end(episode: Episode, reason: str) -> Episode:
     episode.reason = reason
     return episode
-
-
-def distances(
-    task: AbstractTask, episode: Episode
-) -> Float[np.ndarray, " observation"]:
-    """Return the remaining distances before each push and at the end (m)."""
-    states = [step.observed for step in episode.steps]
-    states += [episode.final] if episode.final is not None else []
-    return np.array([float(task.distance(state)) for state in states])

@@ -6,7 +6,6 @@ sides of the disk or of the time of recording, so that a model must extrapolate.
 """
 
 from collections.abc import Callable, Mapping
-from typing import get_args
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,7 +16,6 @@ from sainet.datasets.splits import fold_of_push, linked
 from sainet.datasets.store import Store
 from sainet.runs.errors import BadStore
 
-SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 BLOCKED: tuple[Scheme, ...] = ("place", "direction", "side", "order")
 
 

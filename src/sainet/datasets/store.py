@@ -119,9 +119,9 @@ class Store:
         return arrays
 
     def _read_rows(self, name: str, rows: np.ndarray) -> np.ndarray:
-        array = self._group[name]
         is_range = len(rows) > 0 and rows[-1] - rows[0] == len(rows) - 1
         try:
+            array = self._group[name]
             if is_range and np.all(np.diff(rows) == 1):
                 return array[rows[0] : rows[-1] + 1]
             return array.oindex[rows]

@@ -106,7 +106,6 @@ STABLE_DAMPING = Quantity("damping", "N s/m", 0.0, 2000.0)
 STROKE = Quantity("stroke", "m", 1e-4, 1.0, "millimetres")
 SPEED = Quantity("speed", "m/s", 1e-4, 10.0, "mm/s")
 ALIGNMENT = Quantity("alignment weight", "m", 0.0, 1e4)
-GAP = Quantity("gap", "m", 0.0, 1.0, "millimetres")
 START_GAP = Quantity("gap", "m", -0.005, 1.0, "millimetres")  # negative: an overlap
 LENGTH_DEVIATION = Quantity("standard deviation", "m", 0.0, 0.1, "millimetres")
 ANGLE_DEVIATION = Quantity("standard deviation", "deg", 0.0, 90.0)

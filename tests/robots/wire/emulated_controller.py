@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from ABBRobotEGM.egm import egm_pb2
 
-from sainet.robots.wire.clock import SimulatedClock
+from robots.wire.simulated_clock import SimulatedClock
 from sainet.robots.wire.limits import CYCLE, Stopped
 from sainet.robots.wire.transport import AbstractTransport
 

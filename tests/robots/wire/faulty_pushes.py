@@ -25,8 +25,8 @@ from robots.wire.emulated_controller import (
 )
 from robots.wire.emulated_table import EmulatedTable
 from robots.wire.real_controller import RealController, Report
+from robots.wire.simulated_clock import SimulatedClock
 from sainet.robots.wire.arm import AbstractArm, Stroke
-from sainet.robots.wire.clock import SimulatedClock
 from sainet.robots.wire.guidance import EgmArm
 from sainet.robots.wire.limits import CYCLE, Limits
 from sainet.robots.wire.transport import LOOPBACK, UdpTransport

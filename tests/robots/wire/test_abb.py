@@ -24,6 +24,7 @@ from robots.wire.emulated_controller import (
 )
 from robots.wire.emulated_table import EmulatedTable
 from robots.wire.emulated_tracker import FAULTS, EmulatedTracker, free_port
+from robots.wire.simulated_clock import SimulatedClock
 from sainet.datasets.recorded.resample import resample
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
@@ -32,7 +33,6 @@ from sainet.planning.levels import roll_pushes
 from sainet.robots.wire.abb import AbbRobot, NoPose
 from sainet.robots.wire.arm import AbstractArm, DryArm
 from sainet.robots.wire.cell import Cell, read_cell
-from sainet.robots.wire.clock import SimulatedClock
 from sainet.robots.wire.guidance import EgmArm
 from sainet.robots.wire.limits import CYCLE
 from sainet.robots.wire.transport import UdpTransport
@@ -408,4 +408,8 @@ def test_a_tracker_that_names_no_such_body_lists_those_that_it_names():
 def test_the_robot_closes_its_connections():
     with loop() as made:
         port = made.tracker.port
-    UdpTransport(controller="127.0.0.1", port=port).close()
+        with pytest.raises(BadInput, match="another process listens"):
+            UdpTransport(controller="127.0.0.1", port=port)
+    again = UdpTransport(controller="127.0.0.1", port=port)
+    assert again.port == port
+    again.close()

@@ -23,8 +23,9 @@ from robots.wire.faulty_pushes import (
     straight,
     table,
 )
+from robots.wire.simulated_clock import SimulatedClock
 from sainet.robots.wire.arm import NoFeedback
-from sainet.robots.wire.clock import RealClock, SimulatedClock
+from sainet.robots.wire.clock import RealClock
 from sainet.robots.wire.guidance import PATIENCE, EgmArm
 from sainet.robots.wire.limits import CYCLE, Stopped
 from sainet.robots.wire.transport import LOOPBACK, UdpTransport
@@ -280,4 +281,6 @@ def test_a_closed_arm_frees_its_port():
     transport = UdpTransport(controller=LOOPBACK, port=0)
     with EgmArm(transport, LIMITS):
         port = transport.port
-    UdpTransport(controller=LOOPBACK, port=port).close()
+    again = UdpTransport(controller=LOOPBACK, port=port)
+    assert again.port == port
+    again.close()

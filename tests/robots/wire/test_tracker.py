@@ -12,8 +12,9 @@ from msgspec.structs import replace
 from scipy.spatial.transform import Rotation
 
 from robots.wire.emulated_tracker import FAULTS, EmulatedTracker, free_port, packet
+from robots.wire.simulated_clock import SimulatedClock
 from sainet.robots.wire.cell import Cell, read_cell
-from sainet.robots.wire.clock import AbstractClock, SimulatedClock
+from sainet.robots.wire.clock import AbstractClock
 from sainet.robots.wire.disks import DiskTracker
 from sainet.robots.wire.frames import Rigid
 from sainet.robots.wire.motion_capture import MotionCapture
