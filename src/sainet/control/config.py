@@ -13,8 +13,8 @@ from sainet.scenes.quantities import (
     MOST_PUSHES,
     require_count,
 )
+from sainet.tasks import Goals
 
-Goals = Literal["easy", "hard"]
 GivenProperties = Literal["true", "assumed"]
 _COUNTS = {
     "trials": (1, 1_000_000),

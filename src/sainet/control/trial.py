@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.control.config import ControlConfig
-from sainet.engines.simulator import PAPER
+from sainet.engines.simulator import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
 from sainet.robots import make_robot
 from sainet.robots.base import AbstractRobot
 from sainet.robots.simulated import scene_of
@@ -20,7 +20,6 @@ from sainet.tasks.push_to_goal import PushToGoal, draw_goal
 from sainet.worlds.sampling import scattered
 
 _STARTS, _WRONG = 0x57A2, 0x3A09
-_FRICTION = PAPER.table_friction or 0.0
 
 
 class Trial(NamedTuple):
@@ -69,8 +68,7 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
     )
     given = assumed_frictions(true)
     if config.given_properties == "assumed":
-        assert PAPER.mass and PAPER.radius  # both are assumed
-        given = scene_of(PAPER.mass, PAPER.radius, config.disks, _FRICTION)
+        given = scene_of(PAPER_MASS, PAPER_RADIUS, config.disks, PAPER_FRICTION)
     return Trial(robot, task, wrong_by(given, config, index))
 
 
@@ -96,6 +94,6 @@ def assumed_frictions(scene: Scene) -> Scene:
     return Scene.disks(
         scene.mass.tolist(),
         scene.radius.tolist(),
-        table_friction=_FRICTION,
+        table_friction=PAPER_FRICTION,
         pusher_radius=float(scene.pusher_radius),
     )

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from sainet.datasets.config import GenerateConfig
-from sainet.engines.simulator import PAPER
+from sainet.engines.simulator import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
 from sainet.runs.errors import require
 from sainet.scenes.quantities import MASS, RADIUS
 from sainet.worlds.config import OfDisks, Range
@@ -13,11 +13,11 @@ from sainet.worlds.config import OfDisks, Range
 class FixedConfig(GenerateConfig):
     """Simulated pushes of the same disks every time: those that engines assume."""
 
-    mass_of_each_kg: tuple[float, ...] = PAPER.mass or ()
+    mass_of_each_kg: tuple[float, ...] = PAPER_MASS
     """Mass of each disk (kg)."""
-    radius_of_each_mm: tuple[float, ...] = tuple(1000 * r for r in PAPER.radius or ())
+    radius_of_each_mm: tuple[float, ...] = tuple(1000 * r for r in PAPER_RADIUS)
     """Radius of each disk (mm)."""
-    table_friction: Range = (PAPER.table_friction or 0.0,)
+    table_friction: Range = (PAPER_FRICTION,)
     """Friction coefficient between disks and table."""
 
     def __post_init__(self) -> None:

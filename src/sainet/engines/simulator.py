@@ -49,8 +49,9 @@ class Assumptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 # The paper's properties (section IV-B), and the same with true masses and radii.
-PAPER = Assumptions(mass=(0.896, 1.1), radius=(0.0525, 0.058), table_friction=0.15)
-TRUE_PROPERTIES = Assumptions(table_friction=0.15)
+PAPER_MASS, PAPER_RADIUS, PAPER_FRICTION = (0.896, 1.1), (0.0525, 0.058), 0.15  # kg, m
+PAPER = Assumptions(mass=PAPER_MASS, radius=PAPER_RADIUS, table_friction=PAPER_FRICTION)
+TRUE_PROPERTIES = Assumptions(table_friction=PAPER_FRICTION)
 
 
 class _Spec(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):

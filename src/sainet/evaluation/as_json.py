@@ -7,14 +7,12 @@ import msgspec
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
 
-Json = dict[str, object]
 
-
-def to_json_object(summary: Summary) -> Json:
+def to_json_object(summary: Summary) -> dict[str, object]:
     """Return rows, comparisons and published rows as JSON values."""
     if summary.is_of_trials:
         worlds = {c.label: c.factors.get("world") for c in summary.conditions}
-        found: Json = {
+        found: dict[str, object] = {
             "rows": [_of_world(row, worlds) for row in summary.trials],
             "pairs": [_of_world(test, worlds) for test in summary.tests],
             "published": [
@@ -52,8 +50,8 @@ def to_json_object(summary: Summary) -> Json:
     }
 
 
-def _row(row: Row, *, with_intervals: bool = True) -> Json:
-    found: Json = {
+def _row(row: Row, *, with_intervals: bool = True) -> dict[str, object]:
+    found: dict[str, object] = {
         "model": row.model,
         "body": row.body,
         "group": row.condition or None,
@@ -71,7 +69,7 @@ def _ends(estimate: Estimate) -> list[float | None]:
     return [estimate.low, estimate.high]
 
 
-def _published(summary: Summary) -> list[Json]:
+def _published(summary: Summary) -> list[dict[str, object]]:
     return [
         {
             "model": each.model.slug,
@@ -86,8 +84,8 @@ def _published(summary: Summary) -> list[Json]:
 
 def _of_world(
     found: TrialRow | TrialTest, worlds: Mapping[str, float | str | None]
-) -> Json:
+) -> dict[str, object]:
     """Return every field, beginning with the condition and its world."""
-    fields: Json = msgspec.to_builtins(found)
+    fields: dict[str, object] = msgspec.to_builtins(found)
     del fields["condition"]
     return {"group": found.condition, "world": worlds[found.condition], **fields}

@@ -8,7 +8,7 @@ import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal
 
-from sainet.models.card import TrainingSettings
+from sainet.models.card import Decay, TrainingSettings
 from sainet.models.identity import Features
 from sainet.runs.documents import checked
 from sainet.runs.errors import require, unknown_name
@@ -35,7 +35,7 @@ class Optimiser:
     """Pushes per gradient step."""
     learning_rate: float = 1e-3
     """Initial Adam learning rate."""
-    decay: Literal["halving", "cosine"] = "halving"
+    decay: Decay = "halving"
     """Fall of the learning rate: halving (as in the paper) or cosine (to zero)."""
     halve_every: int = 2_500
     """Iterations between two halvings of the learning rate."""

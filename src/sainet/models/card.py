@@ -13,10 +13,12 @@ from sainet.runs.folders import CONFIG, remake
 from sainet.runs.manifest import Manifest
 from sainet.scenes.quantities import Finite, Size, TimeStep
 from sainet.scenes.recording import AGREES, CameraOffset
+from sainet.worlds.config import SetupName
 
 CARD = "card.json"
 WEIGHTS = "network.safetensors"
 IDENTIFIED = "identified.json"
+Decay = Literal["halving", "cosine"]  # of the learning rate
 Count = Annotated[int, msgspec.Meta(ge=1)]
 
 
@@ -31,7 +33,7 @@ class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=
     batch_size: int
     learning_rate: float
     halve_every: int
-    decay: Literal["halving", "cosine"] = "halving"
+    decay: Decay = "halving"
     clip_norm: float
     average: int
     l2: float | None
@@ -62,7 +64,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     made: ClassVar[str] = "trained"
 
     identity: ModelId
-    kind: Literal["robot", "direct-force"]  # setup of the pushes
+    kind: SetupName  # of the pushes
     time_step: TimeStep  # s
     truth_engine: str  # that made the training data, or `RECORDED`
     integrator: Literal["acceleration", "relaxing-residual"] = "acceleration"

@@ -19,6 +19,7 @@ ROBOTS = {
     "abb": "sainet.robots.wire.connect:abb_robot",
 }
 Surface = Literal["abs", "plywood"]
+SURFACES: tuple[Surface, ...] = get_args(Surface)
 _MOST_LABS = 1_000_000
 _PHYSICAL = "abb"
 _AREA_MM = (1.0, 10_000.0)
@@ -63,7 +64,7 @@ class RobotConfig:
         """Check every setting."""
         require_one_of("robot", self.robot, ROBOTS)
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
-        require_one_of("surface", self.surface, get_args(Surface))
+        require_one_of("surface", self.surface, SURFACES)
         require_count("disks", self.disks, low=2, high=MOST_DISKS)
         require_count("lab", self.lab, low=0, high=_MOST_LABS)
         two = self.robot == "simulated" or self.disks == 2  # noqa: PLR2004

@@ -185,7 +185,7 @@ def read_document(
         found = decode(data, type=kind)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as cause:
         raise error(f"{path}: {_reason(cause)}.{_sentence(remedy)}") from None
-    if _has_seal(kind):
+    if isinstance(found, msgspec.Struct) and hasattr(found, "seal"):
         fields = msgspec.json.decode(data)
         seal, wanted = fields.get("seal"), _seal_of(fields)
         check_seal(path, seal, wanted, error=error, remedy=remedy)
@@ -209,13 +209,9 @@ def sealed_fields(document: msgspec.Struct) -> dict[str, Any]:
     """Return the fields of a struct as JSON values; the field `seal` is filled."""
     # By way of builtins: msgspec would write NaN as null.
     fields = msgspec.to_builtins(document, order="sorted")
-    if _has_seal(type(document)):
+    if hasattr(document, "seal"):
         fields["seal"] = _seal_of(fields)
     return fields
-
-
-def _has_seal(kind: type) -> bool:
-    return "seal" in getattr(kind, "__struct_fields__", ())
 
 
 def _seal_of(fields: Mapping[str, object]) -> str:

@@ -17,6 +17,7 @@ from sainet.scenes.state import Numbers, State, in_a_row
 
 GRAVITY = 9.81  # m/s^2
 TIME_STEP = 1 / 240  # s, the paper's
+PUSHER_RADIUS = 0.0048  # m, the paper's
 
 
 class FrictionField(eqx.Module):
@@ -83,7 +84,7 @@ class Scene(eqx.Module):
         table_friction: float = 0.15,
         disk_friction: float = 0.25,
         pusher_friction: float = 0.25,
-        pusher_radius: float = 0.0048,
+        pusher_radius: float = PUSHER_RADIUS,
         time_step: float = TIME_STEP,
     ) -> "Scene":
         """Return one scene from plain numbers.

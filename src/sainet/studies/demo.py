@@ -7,7 +7,7 @@ from pathlib import Path
 import jax
 import numpy as np
 
-from sainet.control.config import ControlConfig, Goals
+from sainet.control.config import ControlConfig
 from sainet.control.record import EpisodeRecord
 from sainet.control.trials import run_trials
 from sainet.datasets.config import GenerateConfig
@@ -29,6 +29,7 @@ from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Evaluate, Simulate, Train
 from sainet.studies.study import TABLE, Result
+from sainet.tasks import Goals
 
 _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with assumed \
 masses, radii and friction predicts such contacts badly (Physics); a network alone \

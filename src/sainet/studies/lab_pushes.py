@@ -21,7 +21,7 @@ from sainet.evaluation.measurements import Condition, Measurements
 from sainet.learning.recipes import FINE_TUNING, FromModel
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
-from sainet.robots import Surface
+from sainet.robots import SURFACES, Surface
 from sainet.runs.errors import missing_extra
 from sainet.studies import Scale, steps
 from sainet.studies.paper_setup import IN, SAIN, physics, scaled
@@ -36,7 +36,6 @@ TUNED = (Variant("in", "tuned"), Variant("sain", "tuned"))
 IN_TUNED, SAIN_TUNED = (variant.identity() for variant in TUNED)
 # Fine-tuned around the engine with parameters identified on the same pushes.
 AROUND_IDENTIFIED = Variant("sain", "tuned", "identified")
-SURFACES: tuple[Surface, ...] = ("abs", "plywood")
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
 from sainet.evaluation.joining import without_predictions
 from sainet.evaluation.measurements import Condition, Measurements
-from sainet.robots.lab.hidden import LABS, SURFACES, Lab, Surface, draw_lab
+from sainet.robots import SURFACES, Surface
+from sainet.robots.lab.hidden import LABS, Lab, draw_lab
 from sainet.robots.lab.mechanics import TICK, Mechanics
 from sainet.robots.lab.robot import CLEARANCE, approach
 from sainet.studies.paper_setup import physics

@@ -4,7 +4,6 @@ Goals are random: easy goals ahead, hard goals aside.
 """
 
 from abc import abstractmethod
-from typing import Literal
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,6 +14,7 @@ from sainet.runs.errors import BadScene
 from sainet.scenes.geometry import norm
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
+from sainet.tasks import Goals
 
 
 class AbstractTask(eqx.Module):
@@ -109,9 +109,8 @@ def _mirrored(
     return 2 * along - vector
 
 
-GoalKind = Literal["easy", "hard"]
 # Angles from the axis through the disks, to either side (degrees).
-ANGLES: dict[GoalKind, tuple[float, float]] = {
+ANGLES: dict[Goals, tuple[float, float]] = {
     "easy": (0.0, 30.0),
     "hard": (30.0, 60.0),
 }
@@ -120,7 +119,7 @@ _STREAM = 0x60A1
 
 
 def draw_goal(
-    kind: GoalKind,
+    kind: Goals,
     seed: int,
     trial: int,
     *,

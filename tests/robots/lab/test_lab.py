@@ -9,11 +9,11 @@ import pytest
 
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
+from sainet.engines.simulator import PAPER_RADIUS
+from sainet.robots import SURFACES
 from sainet.robots.lab.hidden import (
     LABS,
-    NOMINAL_RADIUS,
     RANGES,
-    SURFACES,
     Disk,
     Field,
     Lab,
@@ -28,7 +28,7 @@ from sainet.scenes.state import State, at_rest, in_a_row
 FLAT = Field(np.zeros((1, 2)), np.zeros(1), 0.0)
 # As close as planar engine and Bullet are to each other in the studies.
 PARITY = (6e-4, np.deg2rad(1))  # m, rad
-TOUCHING = in_a_row(np.array(NOMINAL_RADIUS))
+TOUCHING = in_a_row(np.array(PAPER_RADIUS))
 
 
 def push(contact=0.3, direction=-0.2, length=0.01, speed=0.05):

@@ -3,10 +3,11 @@
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from sainet.control.config import ControlConfig, GivenProperties, Goals
+from sainet.control.config import ControlConfig, GivenProperties
 from sainet.control.worlds import TableConfig
 from sainet.robots import Surface
 from sainet.runs.errors import require, require_one_of, unknown_name
+from sainet.tasks import Goals
 
 if TYPE_CHECKING:
     from sainet.control.gym.actions import ActionKind

@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from sainet.control.config import ControlConfig, Goals
+from sainet.control.config import ControlConfig
 from sainet.control.worlds import TableConfig
 from sainet.runs.errors import require
 from sainet.scenes.quantities import LARGEST_COUNT, require_count
+from sainet.tasks import Goals
 
 DISK_COUNTS = (2, 3, 4)
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")

@@ -5,17 +5,14 @@ docs/virtual-lab.md names the source of each.
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
-Surface = Literal["abs", "plywood"]
-SURFACES: tuple[Surface, ...] = ("abs", "plywood")
+from sainet.engines.simulator import PAPER_MASS, PAPER_RADIUS
+from sainet.robots import SURFACES, Surface
+
 LABS = 5
-NOMINAL_MASS = (0.896, 1.1)  # kg, the paper's disks
-NOMINAL_RADIUS = (0.0525, 0.058)  # m
-PUSHER_RADIUS = 0.0048  # m
 _LAB = 0x1AB
 _WAVES = 128  # Fourier features of a field
 _HARMONICS = 12  # of the friction around a disk
@@ -243,14 +240,14 @@ def _table(rng: np.random.Generator, ranges: Ranges) -> Table:
 
 
 def _disk(rng: np.random.Generator, ranges: Ranges, which: int) -> Disk:
-    radius = NOMINAL_RADIUS[which] + rng.uniform(*ranges.radius_error)
+    radius = PAPER_RADIUS[which] + rng.uniform(*ranges.radius_error)
     count = int(rng.integers(*ranges.feet, endpoint=True))
     # Evenly around the disk, each up to 0.3 of the spacing away.
     angle = 2 * np.pi / count * (np.arange(count) + rng.uniform(-0.3, 0.3, count))
     reach = radius * rng.uniform(*ranges.foot_place, count)
     deviation = rng.uniform(*ranges.rim_variation) / np.sqrt(_HARMONICS)
     return Disk(
-        mass=NOMINAL_MASS[which] * (1 + rng.uniform(*ranges.mass_error)),
+        mass=PAPER_MASS[which] * (1 + rng.uniform(*ranges.mass_error)),
         radius=radius,
         feet=reach[:, None] * np.stack([np.cos(angle), np.sin(angle)], -1),
         rim=deviation * rng.standard_normal((2, _HARMONICS)),

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from sainet.robots.lab.hidden import PUSHER_RADIUS, Lab
+from sainet.robots.lab.hidden import Lab
 from sainet.runs.errors import missing_extra
+from sainet.scenes.scene import PUSHER_RADIUS
 
 TICK = 0.004  # s, between commands and between samples
 _STEP = 0.001  # s, of the simulation

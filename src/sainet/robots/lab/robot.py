@@ -9,11 +9,11 @@ from jaxtyping import Float
 
 from sainet.robots import RobotConfig
 from sainet.robots.base import AbstractRobot
-from sainet.robots.lab.hidden import PUSHER_RADIUS, Lab, draw_lab
+from sainet.robots.lab.hidden import Lab, draw_lab
 from sainet.robots.lab.mechanics import TICK, Mechanics, Motion
 from sainet.scenes.pushes import Push, place_pusher, push_direction
 from sainet.scenes.recording import Conditions, Recording
-from sainet.scenes.scene import Scene, pusher_gaps
+from sainet.scenes.scene import PUSHER_RADIUS, Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest, in_a_row
 
 CLEARANCE = 0.003  # m, between the pusher and disk 1 when it has descended
