@@ -44,7 +44,7 @@ test: setup-dev  ## Run the test suite (PYTEST_ARGS='tests/engines -k slides' fo
 demo: setup  ## Show the whole method, small, in runs/demo/report.html
 	$(BIN)/sainet demo
 
-check: setup-dev  ## Lint, format, types and floors
+check: setup-dev  ## Lint, format, types and layers
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright

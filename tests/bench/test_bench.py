@@ -146,12 +146,12 @@ def watch_starts(monkeypatch) -> list[set[tuple[str, int]]]:
 def test_planning_reports_the_documented_figures(monkeypatch):
     kept = watch_starts(monkeypatch)
     figures = load_case("planning")(2, model="physics")
-    wanted = ("full_tree_s", "greedy_s", "looked_at", "bullet_push_s", "bullet_ratio")
+    wanted = ("full_tree_s", "greedy_s", "evaluated", "bullet_push_s", "bullet_ratio")
     wanted += ("cold_start_s", "warm_start_s", "decisions", "devices")
     assert tuple(figures) == wanted
     bullet = ("bullet_push_s", "bullet_ratio")
     assert all_finite(figures, but=() if find_spec("pybullet") else bullet)
-    assert figures["looked_at"] == 72 + 72**2
+    assert figures["evaluated"] == 72 + 72**2
     # Times of a busy machine prove nothing; what the second start compiled does.
     cold, warm = kept
     searches = [

@@ -58,7 +58,7 @@ def test_an_episode_file_is_complete(done):
         assert np.shape(step.actual) == (25, 2, 3)
         assert np.shape(step.planned)[1:] == (2, 3)
         assert abs(step.contact_angle_deg) <= 60
-        assert step.looked_at >= 72
+        assert step.evaluated >= 72
         # Toward the goal, and near the planned pose.
         gap = np.subtract(step.actual[-1], step.planned[9])[:, :2]
         assert np.abs(gap).max() < 8

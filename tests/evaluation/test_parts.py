@@ -1,6 +1,9 @@
 """`sainet evaluate` in a run folder: each model once, by whichever shard."""
 
 import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
 import pytest
 from safetensors import safe_open
@@ -8,6 +11,7 @@ from safetensors.numpy import load_file, save_file
 
 from learning.stores import quiet_store
 from sainet.cli.entry import run
+from sainet.runs.executors import Machines
 
 MODELS = ("physics", "physics-true")
 
@@ -42,6 +46,34 @@ def test_shards_give_the_same_table(words, printed, tmp_path, capsys):
     assert run(there) == 0
     assert json.loads(capsys.readouterr().out) == printed
     assert [path.stat().st_mtime_ns for path in files(tmp_path)] == before
+
+
+@contextmanager
+def threads(machines, workers=None):
+    """In the place of a scheduler; its jobs travel as to other processes."""
+
+    class Pickling(ThreadPoolExecutor):
+        def submit(self, work, *arguments):
+            return super().submit(*pickle.loads(pickle.dumps((work, *arguments))))
+
+    with Pickling(2) as executor:
+        yield executor
+
+
+def test_workers_of_a_scheduler_give_the_same_table(
+    words, printed, tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(Machines, "executor", threads)
+    there = [*words, "--scheduler", "tcp://nowhere"]
+    assert run(there) == 2
+    assert "--out is missing" in capsys.readouterr().err
+    there += ["--out", str(tmp_path)]
+    assert run([*there, "--shard", "1/2"]) == 2
+    assert "--scheduler is tcp://nowhere" in capsys.readouterr().err
+    assert run(there) == 0
+    assert json.loads(capsys.readouterr().out) == printed
+    assert len(files(tmp_path)) == 2
+    assert not (tmp_path / "shards").exists()
 
 
 def test_bad_shards_end_in_one_line(words, tmp_path, capsys):

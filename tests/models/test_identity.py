@@ -28,6 +28,22 @@ FITTED = PlanarSpec(assumptions=Assumptions(pusher_friction=0.2))
             "sain-identified-residual-place",
             "SAIN, identified, residual, place",
         ),
+        *(
+            (ModelId(kind="sain", simulator=SIMULATORS[name]), slug, label)
+            for name, slug, label in (
+                ("planar-true", "sain-true", "SAIN, true properties"),
+                (
+                    "bullet-true",
+                    "sain-bullet-true",
+                    "SAIN around Bullet, true properties",
+                ),
+            )
+        ),
+        (
+            ModelId(kind="physics", simulator=SIMULATORS["bullet-true"]),
+            "physics-true",
+            "Physics, true properties",
+        ),
         (
             ModelId(kind="sain", simulator=PLANAR, variant="single-steps"),
             "sain-single-steps",

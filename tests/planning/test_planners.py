@@ -84,7 +84,7 @@ def test_the_tree_equals_a_naive_search(angle):
     task = goal_ahead(0.17, angle)
     plan = TreePlanner(actions=FEW).plan(PHYSICS, task, SCENE, STATE)
     assert indices(plan) == best_of(task, 2)
-    assert plan.looked_at == 6 + 36
+    assert plan.evaluated == 6 + 36
     assert plan.is_complete
     # The path is that of the pushes, up to the end that the search predicts.
     end = single(plan.path[-1, :, :2])
@@ -97,9 +97,9 @@ def test_the_tree_equals_a_naive_search(angle):
 def test_near_the_goal_the_best_sequences_get_a_third_push():
     planner = TreePlanner(actions=FEW, beam=36)
     plan = planner.plan(PHYSICS, NEAR, SCENE, STATE)
-    assert plan.looked_at == 6 + 36 + 216
+    assert plan.evaluated == 6 + 36 + 216
     narrow = TreePlanner(actions=FEW, beam=4)
-    assert narrow.plan(PHYSICS, NEAR, SCENE, STATE).looked_at == 6 + 36 + 24
+    assert narrow.plan(PHYSICS, NEAR, SCENE, STATE).evaluated == 6 + 36 + 24
 
 
 def problem(task):
@@ -114,7 +114,7 @@ def test_one_sufficient_push_is_the_plan(name):
     plan = make_planner(name).plan(PHYSICS, task, SCENE, STATE)
     assert len(plan.pushes) == 1
     assert plan.distance <= 0.1 * 0.059
-    assert plan.looked_at >= 72
+    assert plan.evaluated >= 72
 
 
 @every_planner
@@ -138,7 +138,7 @@ def test_the_greedy_search_follows_the_heuristic():
     first = min(ends, key=ends.__getitem__)
     assert found.actions[:1] == first
     assert len(found.actions) == 2
-    assert found.looked_at == 12
+    assert found.evaluated == 12
 
 
 def test_the_greedy_horizon_is_three_near_the_goal():
@@ -154,7 +154,7 @@ def test_the_greedy_horizon_is_three_near_the_goal():
 def test_the_greedy_search_stops_after_its_expansions(most):
     planner = GreedyPlanner(actions=FEW, expansions=most)
     found = planner.search(problem(FAR))
-    assert (found.looked_at, found.is_complete) == (6 + 6 * most, False)
+    assert (found.evaluated, found.is_complete) == (6 + 6 * most, False)
     assert found.cost <= min(float(FAR.cost(e)) for e in naive_ends(1).values()) + 1e-6
 
 
@@ -169,7 +169,7 @@ def test_a_deadline_ends_with_the_best_sequence():
     hasty = TreePlanner(actions=FEW, deadline=1e-9, block=2)
     plan = hasty.plan(PHYSICS, FAR, SCENE, STATE)
     assert not plan.is_complete
-    assert (len(plan.pushes), plan.looked_at) == (1, 6)
+    assert (len(plan.pushes), plan.evaluated) == (1, 6)
     patient = TreePlanner(actions=FEW, deadline=100.0, block=2)
     plan = patient.plan(PHYSICS, FAR, SCENE, STATE)
     assert indices(plan) == best_of(FAR, 2)
@@ -191,7 +191,7 @@ def test_a_deadline_expands_the_best_first_pushes(
     monkeypatch.setattr(Level, "grow", spied)
     planner = TreePlanner(actions=FEW, deadline=5.0, block=2)
     found = planner.search(problem(task))
-    assert (found.looked_at, found.is_complete) == (6 + 4 * 6, False)
+    assert (found.evaluated, found.is_complete) == (6 + 4 * 6, False)
     costs = {s[0]: float(task.cost(end)) for s, end in naive_ends(1).items() if s}
     # The first growth is that of the observed state.
     assert grown[1:] == sorted(costs, key=costs.__getitem__)[:4]

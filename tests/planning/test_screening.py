@@ -62,7 +62,7 @@ def test_equal_residuals_are_screened_without_error():
     problem, first, screened = screen(TASKS[0])
     rows = np.arange(20)
     found, whole = screened.grow(first, rows), first.grow(rows, problem)
-    assert (found.looked_at, len(found.actions)) == (400, FEWEST)
+    assert (found.evaluated, len(found.actions)) == (400, FEWEST)
     best = whole.cheapest(FEWEST)
     np.testing.assert_allclose(
         np.sort(found.cost), np.sort(whole.cost[best]), rtol=0, atol=2e-5
@@ -79,7 +79,7 @@ def test_shipped_networks_select_the_sequence_of_the_search_without(name, task):
         TreePlanner(actions=GRID, is_screened=on).plan(model, task, SCENE, STATE)
         for on in (True, False)
     )
-    assert one.looked_at == two.looked_at
+    assert one.evaluated == two.evaluated
     assert one.cost == pytest.approx(two.cost, rel=1e-4)
     assert len(one.pushes) == len(two.pushes)
     for push, other in zip(one.pushes, two.pushes, strict=True):

@@ -72,7 +72,7 @@ def test_properties_are_crossed():
     assert slugs(varied) == slugs(fixed)
     assert isinstance(fixed.pushes.config, FixedConfig)
     (crossed,), _ = parts("crossed-properties")
-    engines = ["in", "sain-bullet", "sain-true"]
+    engines = ["in", "sain-bullet", "sain-bullet-true"]
     nominal = [f"{slug}-nominal" for slug in engines]
     assert slugs(crossed) == ["physics", "physics-true", *engines, *nominal]
     assert {m.id.simulator.slug for m in crossed.models if m.id.kind == "sain"} == {

@@ -50,7 +50,7 @@ def bench_planning(
     """
     check_runs(runs)
     # The first decision compiles.
-    looked_at = {name: decide(model, name).looked_at for name in PLANNERS}
+    evaluated = {name: decide(model, name).evaluated for name in PLANNERS}
     times: dict[str, list[float]] = {"tree": [], "greedy": [], "bullet": []}
     for _ in range(_ROUNDS):
         for name in PLANNERS:
@@ -62,9 +62,9 @@ def bench_planning(
     return {
         "full_tree_s": tree,
         "greedy_s": median(times["greedy"]),
-        "looked_at": looked_at["tree"],
+        "evaluated": evaluated["tree"],
         "bullet_push_s": push or None,
-        "bullet_ratio": looked_at["tree"] * push / tree or None,
+        "bullet_ratio": evaluated["tree"] * push / tree or None,
         "cold_start_s": cold,
         "warm_start_s": warm,
         "decisions": len(times["tree"]),

@@ -2,21 +2,26 @@
 
 import shlex
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.report import WRITERS
-from sainet.runs.errors import BadInput, require_one_of
+from sainet.runs.errors import BadInput, require, require_one_of
+from sainet.runs.executors import Machines
 from sainet.runs.shards import Shard
+from sainet.runs.workers import each_done
 
 if TYPE_CHECKING:
     from sainet.datasets.store import Store
     from sainet.evaluation.measurements import Measurements
     from sainet.evaluation.parts import Parts
     from sainet.models.model import Model
+
+
+_QUIET = Output(quiet=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +56,7 @@ class Evaluate:
     out: Path | None = None
     """Run folder for the errors of each model: an identical call resumes. Default:
     none."""
-    shard: str | None = None
-    """Share of the models to evaluate into the run folder, for example 3/8 for the
-    third of eight; the same command without a shard evaluates the missing models and
-    prints the table. Default: all models."""
+    machines: Machines = field(default_factory=Machines)
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -82,8 +84,10 @@ class Evaluate:
         for model in models:
             for doubt in doubts_of_count(model.card, store.info.bodies):
                 self.output.warn(f"{model.name}: {doubt}.")
-        if self.shard is not None:
-            return self._measure_share(models, store, Shard.parse(self.shard))
+        if (shard := self.machines.share) is not None:
+            nobody = self.machines.scheduler
+            require(nobody is None, "scheduler", "left out with a shard", nobody)
+            return self._measure_share(models, store, shard)
         measured = measure(rows, store, lambda plain: self._measure(plain, store))
         summary = summarise(measured)
         print_table(arrange(summary), self.output.console)
@@ -122,6 +126,8 @@ class Evaluate:
 
     def _measure(self, models: "list[Model]", store: "Store") -> "Measurements":
         """Return the errors of all models, measured where that is missing."""
+        if self.machines.scheduler is not None:
+            self._measure_elsewhere(models)
         if self.out is None:
             return self._evaluate(models, store, None)
         parts = self._parts(self.out, models, store)
@@ -131,12 +137,36 @@ class Evaluate:
             shards.clear()
         return measured
 
+    def _measure_elsewhere(self, models: "list[Model]") -> None:
+        """Measure the errors of each model on a worker of the scheduler, as a shard."""
+        shards = [Shard(1 + index, len(models)) for index in range(len(models))]
+        jobs = [
+            (replace(self, machines=Machines(shard=str(shard)), output=_QUIET), index)
+            for index, shard in enumerate(shards)
+        ]
+        bar = progress_bar("Predicting", len(models), self.output)
+        with self.machines.executor() as executor, bar as advance:
+            for index in each_done(executor, Evaluate.measure_part, jobs):
+                advance(1, models[index].name)
+
+    def measure_part(self, index: int) -> int:
+        """Measure the errors of the models of the shard, and return a number.
+
+        The job of a worker.
+        """
+        from sainet.datasets.store import open_part
+
+        store, shard = open_part(self.data, self.group), self.machines.share
+        assert shard is not None
+        self._measure_share(self._load(store), store, shard)
+        return index
+
     def _measure_share(
         self, models: "list[Model]", store: "Store", shard: Shard
     ) -> Json:
         """Measure the errors of the models of a shard."""
         if self.out is None:
-            raise BadInput("`out` is missing; give the folder that all shards share.")
+            raise BadInput("`out` is missing; give the folder for errors of models.")
         parts = self._parts(self.out, models, store, shared=True)
         own = [models[index] for index in shard.own(len(models))]
         with parts.share(shard) as share:

@@ -50,7 +50,7 @@ class StepRecord(msgspec.Struct, kw_only=True):
     planned_pushes: _Count = 1
     planned: list[list[_Pose]]  # predicted poses by time and disk
     planned_distance_mm: _Place = None
-    looked_at: _Count = 0  # candidate pushes
+    evaluated: _Count = 0  # candidate pushes
     is_complete: bool = True  # False: the deadline ended the search
     warnings: list[str] = []
     actual: list[list[_Pose]]  # measured poses by time and disk
@@ -225,7 +225,7 @@ def record_step(trial: Trial, step: ControlStep) -> StepRecord:
         planned_pushes=len(plan.pushes),
         planned=listed_poses(plan.path[_EVERY - 1 :: _EVERY]),
         planned_distance_mm=_known(1000 * plan.distance),
-        looked_at=plan.looked_at,
+        evaluated=plan.evaluated,
         is_complete=plan.is_complete,
         warnings=list(plan.warnings),
         actual=listed_poses(pose),

@@ -99,7 +99,7 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
         """The name for readers."""
         if self.name:
             return self.name
-        kinds, words = _KINDS, filter(None, self._parts()[1:])
+        kinds, words = _KINDS, filter(None, self._parts()[2:])
         if self.features == "contact":  # always residuals
             words = (word for word in words if word != self.data)
         if self.features == "whole-state":
@@ -110,29 +110,29 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     def _parts(self) -> list[str]:
         """Return the parts of the slug after the kind, empty where usual."""
         return [
-            self._simulator_part(),
+            *self._simulator_parts(),
             "" if self.data == "paper" else self.data,
             "" if self.features == "paper" else self.features,
             self.variant,
             _ABSTAINING if self.abstains else "",
         ]
 
-    def _simulator_part(self) -> str:
+    def _simulator_parts(self) -> tuple[str, str]:
+        """Return the engine, empty where usual, and the properties that it assumes."""
         if self.simulator is None or self.kind == "in":
-            return ""
+            return "", ""
         if isinstance(self.simulator, OwnSpec):
-            return self.simulator.name
-        if self.simulator.assumptions == TRUE_PROPERTIES:
-            return "true"
-        if self.simulator.assumptions != PAPER:
-            return "identified"
+            return self.simulator.name, ""
         # Physics is named for what it assumes, not for its engine.
         is_usual = self.kind == "physics" or self.simulator.engine == "planar"
-        return "" if is_usual else self.simulator.engine
+        known = {PAPER: "", TRUE_PROPERTIES: "true"}
+        properties = known.get(self.simulator.assumptions, "identified")
+        return "" if is_usual else self.simulator.engine, properties
 
     def _engine_label(self) -> str:
-        part = self._simulator_part()
-        return _ENGINE_LABELS.get(part, f" around {part.capitalize()}")
+        engine, properties = self._simulator_parts()
+        around = engine and f" around {engine.capitalize()}"
+        return around + _PROPERTIES_LABELS[properties]
 
 
-_ENGINE_LABELS = {"": "", "true": ", true properties", "identified": ", identified"}
+_PROPERTIES_LABELS = {"": "", "true": ", true properties", "identified": ", identified"}

@@ -31,7 +31,7 @@ class Plan:
         predict: returns `path`.
         cost: at the end of the path.
         distance: of the target disk from the goal at the end of the path (m).
-        looked_at: number of predicted pushes.
+        evaluated: number of predicted candidate pushes.
         is_complete: False: a deadline or limit ended the search early.
         warnings: why the prediction may be inaccurate.
     """
@@ -40,7 +40,7 @@ class Plan:
     predict: Callable[[], Float[np.ndarray, "time body 3"]] = field(repr=False)
     cost: float
     distance: float
-    looked_at: int
+    evaluated: int
     is_complete: bool = True
     warnings: tuple[str, ...] = ()
 
@@ -91,7 +91,7 @@ class AbstractPlanner(eqx.Module):
             predict=partial(predicted_path, dynamics, scene, state, pushes),
             cost=found.cost,
             distance=found.distance,
-            looked_at=found.looked_at,
+            evaluated=found.evaluated,
             is_complete=found.is_complete,
             warnings=tuple(doubts(dynamics, gap, pushes)),
         )

@@ -40,7 +40,7 @@ class GreedyPlanner(AbstractPlanner):
                 return choose(levels)
             level, row = queue.pop()
             if level.actions.shape[1] == horizon:
-                return level.found(row, sum(v.looked_at for v in levels))
+                return level.found(row, sum(v.evaluated for v in levels))
             levels.append(level.grow(np.array([row]), problem))
             queue.add(levels[-1])
         return choose(levels, is_complete=False)

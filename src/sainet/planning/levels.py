@@ -177,7 +177,7 @@ class Found:
     actions: tuple[int, ...]
     cost: float
     distance: float  # m
-    looked_at: int
+    evaluated: int
     is_complete: bool = True
 
 
@@ -190,7 +190,7 @@ class Level:
     screened_out: int = 0  # further sequences, which only an engine predicted
 
     @property
-    def looked_at(self) -> int:
+    def evaluated(self) -> int:
         """The number of predicted sequences."""
         return len(self.actions) + self.screened_out
 
@@ -228,13 +228,13 @@ class Level:
         """Return the states at the end of some sequences."""
         return jax.tree.map(lambda x: x[rows], self.outcomes.state)
 
-    def found(self, row: int, looked_at: int, *, is_complete: bool = True) -> Found:
+    def found(self, row: int, evaluated: int, *, is_complete: bool = True) -> Found:
         """Return one of the sequences as the result of a search."""
         return Found(
             actions=tuple(int(action) for action in self.actions[row]),
             cost=float(self.outcomes.cost[row]),
             distance=float(self.outcomes.distance[row]),
-            looked_at=looked_at,
+            evaluated=evaluated,
             is_complete=is_complete,
         )
 
@@ -249,17 +249,17 @@ def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     Raises:
         Diverged: no cost is finite.
     """
-    looked_at = sum(level.looked_at for level in levels)
+    evaluated = sum(level.evaluated for level in levels)
     for level in levels:
         solved = level.outcomes.solved
         if solved.any():
             distance = np.where(solved, level.outcomes.distance, np.inf)
             nearest = int(np.argmin(distance))
-            return level.found(nearest, looked_at, is_complete=is_complete)
+            return level.found(nearest, evaluated, is_complete=is_complete)
     best = min(levels, key=lambda level: level.cost.min())
     if not np.isfinite(best.cost.min()):
         raise Diverged(
-            f"model: none of the {looked_at} candidate pushes is both feasible and "
+            f"model: none of the {evaluated} candidate pushes is both feasible and "
             "finite; check the scene and the observation, or use another model."
         )
-    return best.found(int(best.cheapest(1)[0]), looked_at, is_complete=is_complete)
+    return best.found(int(best.cheapest(1)[0]), evaluated, is_complete=is_complete)

@@ -157,7 +157,7 @@ class Session:
             predict=lambda: path,
             cost=np.nan,
             distance=float(np.linalg.norm(target[:2] - goal)),
-            looked_at=0,
+            evaluated=0,
             warnings=tuple(self._doubts(moment, push)),
         )
         return self._execute(plan)

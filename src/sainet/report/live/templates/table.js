@@ -201,7 +201,7 @@ export class Table {
 
   showPlan(step, model) {
     this.layers.plan.replaceChildren();
-    if (step.planned_pushes < 1 || step.looked_at === 0) return;
+    if (step.planned_pushes < 1 || step.evaluated === 0) return;
     step.observed.forEach((pose, index) => {
       const line = this.line([pose, ...step.planned.map((poses) => poses[index])], this.layers.plan);
       line.setAttribute("class", `planned model-${model}`);
