@@ -1,5 +1,7 @@
 """Divisions of recorded pushes into folds: what test pushes lack."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
