@@ -17,14 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sainet.models.identity import ModelId
-from sainet.runs.documents import (
-    UNSEALED,
-    check_seal,
-    read_file,
-    seal_of,
-    sealed,
-    write_bytes,
-)
+from sainet.runs.documents import UNSEALED, check_sealed, read_file, sealed, write_bytes
 from sainet.runs.errors import BadInput
 from sainet.runs.manifest import Manifest, manifest
 
@@ -230,9 +223,8 @@ class Measurements:
         # Sorted, so that the order of adding variables does not matter.
         names = sorted(str(name) for name in self.data.variables)
         parts = {n: (self.data[n].dims, self.data[n].values) for n in names}
-        header = msgspec.json.encode(self.header).decode()
-        attributes = {_HEADER: header, _SEAL: UNSEALED}
-        data = xr.Dataset(parts, attrs=attributes).set_coords([*_COORDINATES])
+        attrs = {_HEADER: msgspec.json.encode(self.header).decode(), _SEAL: UNSEALED}
+        data = xr.Dataset(parts, attrs=attrs).set_coords([*_COORDINATES])
         return sealed(bytes(data.to_netcdf(engine="scipy", format="NETCDF3_64BIT")))
 
     def write(self, path: Path) -> None:
@@ -284,7 +276,7 @@ def read_measurements(path: Path) -> Measurements:
         reason = " ".join(str(cause).split())[:200] or type(cause).__name__
         raise BadInput(f"{path}: no measurements ({reason}); {_REMEDY}.") from None
     if seal or path.suffix != ".xz":  # evidence of earlier versions has none
-        check_seal(path, seal, seal_of(data, seal))
+        check_sealed(path, data, seal)
     return found
 
 

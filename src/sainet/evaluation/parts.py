@@ -5,8 +5,6 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from sainet.datasets.store import Store
 from sainet.evaluation.metrics import Errors
 from sainet.models.checkpoint import read_arrays, write_arrays
@@ -64,8 +62,7 @@ class Parts:
         """
         path = self.file(model)
         if not path.is_file():
-            found = {k: np.ascontiguousarray(v) for k, v in measure().items()}
-            write_arrays(path, found)
+            write_arrays(path, measure())
         return read_arrays(path)
 
     def share(self, shard: Shard) -> AbstractContextManager[Share]:

@@ -27,14 +27,13 @@ from sainet.models.nominal import NominalFeatures
 from sainet.runs.documents import (
     AGAIN,
     UNSEALED,
-    check_seal,
+    check_sealed,
     content_hash,
     read_file,
-    seal_of,
     sealed,
     write_bytes,
 )
-from sainet.runs.errors import BadCheckpoint, BadInput
+from sainet.runs.errors import BadCheckpoint
 
 _LARGEST = 1 << 32  # bytes of a file
 
@@ -42,58 +41,50 @@ _LARGEST = 1 << 32  # bytes of a file
 def save_arrays(path: Path, tree: Any) -> bytes:  # noqa: ANN401
     """Write all arrays of a tree atomically; returns what was written."""
     leaves = jax.tree_util.tree_flatten_with_path(tree)[0]
-    # Not ascontiguousarray: it makes a scalar an array of one.
-    named = {
-        jax.tree_util.keystr(where): np.asarray(leaf, order="C")
-        for where, leaf in leaves
-    }
+    named = {jax.tree_util.keystr(where): leaf for where, leaf in leaves}
     return write_arrays(path, named)
 
 
-def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> bytes:
+def write_arrays(path: Path, arrays: Mapping[str, Any]) -> bytes:
     """Write named arrays atomically, sealed; returns what was written."""
     from safetensors.numpy import save
 
-    data = sealed(save({**arrays}, {"seal": UNSEALED}))
+    # Not ascontiguousarray: it makes a scalar an array of one.
+    named = {name: np.asarray(array, order="C") for name, array in arrays.items()}
+    data = sealed(save(named, {"seal": UNSEALED}))
     write_bytes(path, data)
     return data
 
 
 def read_arrays(
-    path: Path,
-    error: type[BadInput] = BadInput,
-    remedy: str = AGAIN,
-    *,
-    known: str | None = None,
+    path: Path, remedy: str = AGAIN, *, known: str | None = None
 ) -> dict[str, np.ndarray]:
     """Read named arrays.
 
     Args:
         path: of the file.
-        error: to raise.
         remedy: what the user can do, without a full stop.
         known: hash of the file in a card; None: the file has a seal.
 
     Raises:
-        BadInput: or the given subclass: the file is missing, damaged or edited.
+        BadInput: the file is missing, damaged or edited.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    data = read_file(path, most=_LARGEST, error=error)
+    data = read_file(path, most=_LARGEST, error=BadCheckpoint)
     try:
         found = load(data)
-    except (SafetensorError, ValueError, KeyError) as cause:
-        raise error(
-            f"{path}: truncated or no safetensors file ({str(cause).splitlines()[0]}); "
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise BadCheckpoint(
+            f"{path}: truncated or no safetensors file ({str(error).splitlines()[0]}); "
             f"{remedy}."
         ) from None
     if known is None:
         header = msgspec.json.decode(data[8 : 8 + int.from_bytes(data[:8], "little")])
-        seal = header.get("__metadata__", {}).get("seal")
-        check_seal(path, seal, seal_of(data, seal or ""), error=error, remedy=remedy)
+        check_sealed(path, data, header.get("__metadata__", {}).get("seal", ""))
     elif content_hash(data) != known:
-        raise error(
+        raise BadCheckpoint(
             f"{path}: its hash is another than `weights` of the card; the two do not "
             f"belong together, {remedy}."
         )
@@ -118,7 +109,7 @@ def load_arrays(
     Raises:
         BadCheckpoint: the file is missing or damaged, or an array does not fit.
     """
-    found = read_arrays(path, BadCheckpoint, remedy, known=known)
+    found = read_arrays(path, remedy, known=known)
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)
     return jax.tree.unflatten(
         structure, [_take(path, found, where, leaf) for where, leaf in leaves]

@@ -187,7 +187,7 @@ def read_document(
         raise error(f"{path}: {_reason(cause)}.{_sentence(remedy)}") from None
     if isinstance(found, msgspec.Struct) and hasattr(found, "seal"):
         fields = msgspec.json.decode(data)
-        seal, wanted = fields.get("seal"), _seal_of(fields)
+        seal, wanted = str(fields.get("seal", "")), _seal_of(fields)
         check_seal(path, seal, wanted, error=error, remedy=remedy)
         found = msgspec.structs.replace(found, seal="")  # of the file, not the value
     return found
@@ -225,14 +225,15 @@ def sealed(data: bytes) -> bytes:
     return data.replace(UNSEALED.encode(), content_hash(data).encode(), 1)
 
 
-def seal_of(data: bytes, seal: str) -> str:
-    """Return what the seal of a file must be, by its content without this seal."""
-    return content_hash(data.replace(seal.encode(), UNSEALED.encode(), 1))
+def check_sealed(path: Path, data: bytes, seal: str) -> None:
+    """Raise `BadInput` unless a file is as `sealed` returned it, with this seal."""
+    unsealed = data.replace(seal.encode(), UNSEALED.encode(), 1)
+    check_seal(path, seal, content_hash(unsealed))
 
 
 def check_seal(
     path: Path,
-    found: str | None,
+    found: str,
     wanted: str,
     *,
     error: type[BadInput] = BadInput,
