@@ -237,9 +237,12 @@ def test_two_models_of_one_name_are_refused(simulated):
         evaluate([resting(), resting()], simulated)
 
 
-@pytest.mark.parametrize("steps", [-1, 13])
-def test_steps_that_the_pushes_do_not_have_are_refused(simulated, steps):
-    with pytest.raises(BadInput, match=f"`steps` is {steps}; .* has 12"):
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [(-1, "`steps` is -1; it must be at least 0"), (13, "`steps` is 13; .* has 12")],
+)
+def test_steps_that_the_pushes_do_not_have_are_refused(simulated, steps, message):
+    with pytest.raises(BadInput, match=message):
         evaluate([resting()], simulated, steps=steps)
 
 
