@@ -148,9 +148,10 @@ def body(name: str, page: str, title: str, summary: Summary) -> str:
     verdicts = "".join(f"<p>{html.escape(v)}</p>\n" for v in verdicts_on(summary))
     parts = [
         f"<h1>Every number: {html.escape(title)}</h1>\n"
-        f'<p>Of the page <a href="../{page}.html">{html.escape(title)}</a>. A heading '
-        "sorts its column, a second time the other way round.</p>\n"
-        '<p><label>Rows that contain <input type="search" class="filter"></label></p>\n'
+        f'<p>All numbers behind the page <a href="../{page}.html">{html.escape(title)}'
+        "</a>. Click a heading to sort by its column; click again to reverse the "
+        "order.</p>\n"
+        '<p><label>Show rows that contain <input type="search" class="filter"></label></p>\n'
     ]
     for grid in grids(name, summary):
         file = f"{name}{grid.suffix}.csv"
