@@ -151,7 +151,8 @@ def body(name: str, page: str, title: str, summary: Summary) -> str:
         f'<p>All numbers behind the page <a href="../{page}.html">{html.escape(title)}'
         "</a>. Click a heading to sort by its column; click again to reverse the "
         "order.</p>\n"
-        '<p><label>Show rows that contain <input type="search" class="filter"></label></p>\n'
+        "<p><label>Show rows that contain "
+        '<input type="search" class="filter"></label></p>\n'
     ]
     for grid in grids(name, summary):
         file = f"{name}{grid.suffix}.csv"
