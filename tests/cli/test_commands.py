@@ -15,7 +15,7 @@ from sainet import __version__
 from sainet.cli import entry
 from sainet.cli.bench import Bench
 from sainet.cli.datasets import Generate
-from support import SOURCE
+from support import SOURCE, write_sealed
 
 SMALL = ["--pushes", "24", "--chunk-size", "12", "--workers", "1", "--quiet"]
 # Runs one command after another in one process: its start and what it compiles take
@@ -317,7 +317,7 @@ def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):
     out = tmp_path / "net"
     shutil.copytree(SOURCE / "models" / "pretrained" / "in", out)
     card = json.loads((out / "card.json").read_text())
-    (out / "card.json").write_text(json.dumps(card | {"time_step": 0.01}))
+    write_sealed(out / "card.json", card | {"time_step": 0.01})
     error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr
     assert f"{out}/card.json: time_step is 0.01 s" in error
     assert "--force" in error

@@ -14,6 +14,7 @@ from report import test_verdicts as verdicts
 from sainet.evaluation.lab_outcomes import TrialOutcome
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Estimate, Summary
+from sainet.models.identity import ModelId
 from sainet.report import WRITERS
 from sainet.report.arrange import arrange
 from sainet.report.writers import (
@@ -228,10 +229,10 @@ def test_hostile_names_stay_text():
 
 def test_names_mean_nothing_to_latex():
     name = r"[a^b~c] \d{e} <f>|g_h"
-    result = msgspec.structs.replace(
-        samples.result(), rows=(samples.row(name, 1, 0.3),), models=()
-    )
-    (line,) = [line for line in to_latex(arrange(result)).splitlines() if "g" in line]
+    model = ModelId(kind="physics", name=name)
+    row = samples.row(model.slug, 1, 0.3)
+    result = msgspec.structs.replace(samples.summary([row]), models=(model,))
+    (line,) = [e for e in to_latex(arrange(result)).splitlines() if "g\\_h" in e]
     assert line.startswith(
         r"{[}a\textasciicircum{}b\textasciitilde{}c] \textbackslash{}d\{e\} "
         r"\textless{}f\textgreater{}\textbar{}g\_h & "
