@@ -41,8 +41,8 @@ class CrossValidate:
     """Number of folds."""
     models: tuple[CandidateName, ...] = USUAL_CANDIDATES
     """Learned models to compare with the engine as it is and the identified engine:
-    Gaussian processes (gp) and networks (sain). side: only for pushes of one disk.
-    place: only for pushes of one disk on the same part of one table."""
+    Gaussian processes (gp) and networks (sain). side: if all pushes are of the same
+    disk. place: if they are also on the same part of one table."""
     group: str | None = None
     """Group of pushes to use, or surface (default: all groups)."""
     pushes: int | None = None

@@ -66,7 +66,8 @@ class AbstractPlanner(eqx.Module):
         """Return the plan for the next pushes, with its predicted path.
 
         Args:
-            model: predicts; a model, its dynamics, its name or its folder.
+            model: predicts; a model, its dynamics, its name or its folder. Names and
+                folders are read in every call.
             task: task to solve.
             scene: one scene, without a batch axis, with the properties for the model.
             state: observed state, assumed to be at rest.

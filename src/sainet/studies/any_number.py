@@ -152,8 +152,9 @@ def _claims() -> Iterator[Claim]:
     for disks, arrangement in product(TESTED[2:], ARRANGEMENTS):
         where = f"{disks} disks, {arrangement}"
         yield Claim(
-            "a contact network trained on one to four disks errs clearly less than its "
-            f"engine in half of all errors, in none {_MARGIN:.0%} more, {where}",
+            f"with {where}, a contact network trained on one to four disks has at "
+            "least half of its errors clearly below those of its engine, and none over "
+            f"{_MARGIN:.0%} above",
             errs_at_most_more(
                 MIXED.slug, TRUE_PROPERTIES, _MARGIN, condition=where, less=_HALF
             ),
