@@ -1,5 +1,7 @@
 """Studies of few recorded pushes, tiny and on made-up ones."""
 
+from importlib.util import find_spec
+
 import numpy as np
 import pytest
 
@@ -7,11 +9,12 @@ from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import Header, Measurements, measurements_of
 from sainet.evaluation.metrics import MEASURED
-from sainet.studies import load_study, recorded_active, recorded_few
+from sainet.studies import active_choice, load_study, recorded_few
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
 from sainet.studies.data_efficiency import of_pushes
 from sainet.studies.runner import Runner
 from sainet.studies.study import STEPS, Scope
+from support import require
 
 PUSHES = 48
 
@@ -54,8 +57,8 @@ def test_the_quick_scale_takes_pushes_from_the_whole_of_a_group(recorded, monkey
 def test_orders_begin_alike_and_are_tested_on_other_kinds(
     recorded, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(recorded_active, "DRAWS", {"quick": 1})
-    monkeypatch.setattr(recorded_active, "COUNTS", {"quick": (12, 18)})
+    monkeypatch.setattr(active_choice, "DRAWS", {"quick": 1})
+    monkeypatch.setattr(active_choice, "COUNTS", {"quick": (12, 18)})
     study, scope = load_study("recorded-active"), Scope("quick", recorded)
     step = study.plan(scope).measured
     measured = Runner(tmp_path / STEPS).result(step)
@@ -70,6 +73,21 @@ def test_orders_begin_alike_and_are_tested_on_other_kinds(
     physics = measured.values("final_pos_mm", "physics-identified").ravel()
     assert (physics[first] == physics[later]).all()
     assert first.sum() == PUSHES / 4
+
+
+@pytest.mark.slow
+def test_pushes_of_labs_are_chosen_too(tmp_path, monkeypatch):
+    require(find_spec("mujoco"), "MuJoCo is not installed")
+    monkeypatch.setattr(active_choice, "LABS", {"quick": (2, 30)})
+    monkeypatch.setattr(active_choice, "COUNTS", {"quick": (10, 12)})
+    draws = load_study("lab-active").plan(Scope("quick", None)).measured.parts
+    assert [draw.pushes.config.lab for draw in draws] == [0, 1]
+    found = Runner(tmp_path / STEPS).result(draws[0])
+    for name in ("physics-identified", "at-random", "chosen"):
+        values = found.values("final_pos_mm", name)
+        assert values.shape[-1] == 2  # both disks
+        assert (values > 0).all()
+        assert values.max() < 20
 
 
 def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
@@ -93,7 +111,7 @@ def test_the_saving_is_where_the_curves_meet():
         errors = np.empty((3, 1, draws * tests, 1))
         errors[0], errors[1], errors[2] = 1.0, 40 / count, 20 / count
         header = Header(
-            models=(PHYSICS_IDENTIFIED, recorded_active.RANDOM, recorded_active.CHOSEN)
+            models=(PHYSICS_IDENTIFIED, active_choice.RANDOM, active_choice.CHOSEN)
         )
         part = measurements_of(
             dict.fromkeys(MEASURED, errors),
@@ -106,7 +124,7 @@ def test_the_saving_is_where_the_curves_meet():
     whole = join(parts)
     folds = np.tile(np.repeat(np.arange(draws), tests), len(counts)).astype(np.int32)
     data = whole.data.assign_coords(fold=("sample", folds))
-    found = recorded_active.pushes_for_the_last(
+    found = active_choice.pushes_for_the_last(
         Measurements(data, whole.header), "final_pos_mm"
     )
     assert found.value == found.low == found.high == pytest.approx(100)

@@ -62,6 +62,9 @@ class ControlConfig(RobotConfig):
     """Estimate the properties that affect pushes (radii, ratios of masses, contact
     frictions, pressure) from the pushes of each episode, starting from the given
     properties."""
+    new_surface_after: int | None = None
+    """Number of pushes after which the surface changes: to the other surface of the
+    virtual lab, or to a simulated table with another friction. Default: never."""
     tolerance: float = 0.1
     """Success tolerance (fraction of target-disk radius)."""
     stopping_tolerance: float = 0.9
@@ -95,6 +98,10 @@ class ControlConfig(RobotConfig):
         require_one_of(
             "given_properties", self.given_properties, get_args(GivenProperties)
         )
+        if self.new_surface_after is not None:
+            require_count("new_surface_after", self.new_surface_after)
+            wanted = "left out if `robot` is physical; exchange its surface by hand"
+            require(not self.is_physical, "new_surface_after", wanted, self.robot)
         wrong = self.property_error
         wanted = f"from 0 to {_MOST_WRONG:g}"
         require(0 <= wrong <= _MOST_WRONG, "property_error", wanted, wrong)
@@ -127,6 +134,9 @@ class ControlConfig(RobotConfig):
         super().check_used()
         is_anywhere = not self.starts_in_a_row
         self._check_used("area_mm", is_anywhere, "`robot` is lab or abb")
+        after = self.new_surface_after
+        is_reached = after is None or after < self.pushes
+        self._check_used("new_surface_after", is_reached, "below `pushes`")
 
 
 _GAP_MM = (0.01, 100.0)

@@ -9,8 +9,8 @@ from jaxtyping import Float
 
 from sainet.control.config import ControlConfig
 from sainet.engines.simulator import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
-from sainet.robots import make_robot
 from sainet.robots.base import AbstractRobot
+from sainet.robots.changing import changing_robot
 from sainet.robots.simulated import scene_of
 from sainet.scenes.pushes import push_axis
 from sainet.scenes.scene import Scene
@@ -32,7 +32,8 @@ class Trial(NamedTuple):
 
 def make_trial(config: ControlConfig, index: int) -> Trial:
     """Return the robot and the goal of one trial, equal for all models and planners."""
-    robot = make_robot(config, config.seed, index)
+    after, seed = config.new_surface_after, (config.seed, index)
+    robot = changing_robot(config, after, *seed)
     true = robot.scene
     if not config.starts_in_a_row:
         rng = np.random.default_rng([_STARTS, config.seed, index])

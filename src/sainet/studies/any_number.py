@@ -1,7 +1,7 @@
 """Any number of disks: what networks of two disks, or of one to four, predict of more.
 
 Bullet is the truth. A contact network corrects the engine with the true masses and
-radii; the paper's networks are the shipped ones, trained on two disks.
+radii; the paper's networks are those of Table III, trained on two disks.
 """
 
 from collections.abc import Iterator
@@ -22,8 +22,15 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.report.figures.counts import draw_errors_over_disks
 from sainet.studies import Scale
-from sainet.studies.paper_setup import IN, SAIN, chunk_of, in_batches, physics
-from sainet.studies.steps import Evaluate, Join, Load, Simulate, Step, Train
+from sainet.studies.paper_setup import (
+    IN,
+    SAIN,
+    PaperSetup,
+    chunk_of,
+    in_batches,
+    physics,
+)
+from sainet.studies.steps import Evaluate, Join, Simulate, Step, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import Arrangement
 
@@ -43,7 +50,7 @@ ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
 GAPS_MM = (-2, -1, 0, 1, 2, 5)
 # Training pushes of each number of disks, test pushes of each condition, iterations.
 SIZES = {"quick": (48, 16, 10), "paper": (1500, 500, None)}
-TRAININGS = 5  # of each network
+TRAININGS, OF_TABLE = 5, 3  # of each network, and of those of Table III
 _TRAINING_SEED, _TEST_SEED = 100, 200
 
 
@@ -99,9 +106,10 @@ def _recipes(scope: Scope) -> Iterator[Recipe]:
         yield recipe.changed(iterations=iterations, seed=seed)
 
 
-def _paper() -> tuple[Step[Model], ...]:
-    """Return physics and the paper's networks."""
-    return (*physics(), Load(IN, "in"), Load(SAIN, "sain"))
+def _models(scope: Scope) -> tuple[Step[Model], ...]:
+    """Return physics, the networks of Table III, and contact networks of two disks."""
+    train, seeds = PaperSetup("robot", scope.scale).train, scope.seeds(OF_TABLE)
+    return (*physics(), *train((IN, SAIN), seeds), *of_two(scope))
 
 
 def _conditions() -> Iterator[tuple[GenerateConfig, Condition]]:
@@ -117,8 +125,7 @@ def _conditions() -> Iterator[tuple[GenerateConfig, Condition]]:
 
 def _numbers(scope: Scope) -> Plan:
     """Return the errors against the number of disks, in each arrangement."""
-    scale = scope.scale
-    models = (*_paper(), *of_two(scope), *of_one_to_four(scope))
+    scale, models = scope.scale, (*_models(scope), *of_one_to_four(scope))
     parts = (
         Evaluate(models, test_pushes(scale, config, named.label), named)
         for config, named in _conditions()
@@ -128,12 +135,11 @@ def _numbers(scope: Scope) -> Plan:
 
 def _gaps(scope: Scope) -> Plan:
     """Return the errors of two disks against the gap between them at the start."""
-    scale, parts = scope.scale, []
+    scale, models, parts = scope.scale, _models(scope), []
     for gap in GAPS_MM:
-        label = f"gap of {gap} mm"
-        tests = test_pushes(scale, GenerateConfig(gap_mm=gap), label)
-        named = Condition(label=label, factors={"gap_mm": gap})
-        parts.append(Evaluate((*_paper(), *of_two(scope)), tests, named))
+        named = Condition(label=f"gap of {gap} mm", factors={"gap_mm": gap})
+        tests = test_pushes(scale, GenerateConfig(gap_mm=gap), named.label)
+        parts.append(Evaluate(models, tests, named))
     return Plan(Join(tuple(parts)))
 
 

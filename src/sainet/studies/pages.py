@@ -22,6 +22,7 @@ from sainet.evaluation.summary import Summary
 from sainet.report.verdicts import beside_published, rulings
 from sainet.runs.documents import write_bytes
 from sainet.studies import STUDIES, load_study
+from sainet.studies.active_choice import saving
 from sainet.studies.conclusions import HEADINGS as CLAIM_HEADINGS
 from sainet.studies.conclusions import conclude
 from sainet.studies.conclusions import rows_of as rows_of_claims
@@ -39,7 +40,6 @@ from sainet.studies.page_parts import (
     slashed,
     table,
 )
-from sainet.studies.recorded_active import saving
 
 TEMPLATES, PAGES = "docs/templates", "docs/results"
 BEGIN, END = "<!-- rendered by make pages -->\n", "<!-- end of rendered text -->"
@@ -83,7 +83,7 @@ def helpers(evidence: Evidence) -> dict[str, object]:
         "beside_paper": lambda name: beside_published(summary(name)),
         "trainings": lambda name: trainings(summary(name)),
         "errors": lambda name, *which: errors(summary(name), *which),
-        "saving": lambda metric: saving(evidence.measured("recorded-active"), metric),
+        "saving": lambda name, metric: saving(evidence.measured(name), metric),
         "solved": solved,
         "travel": lambda name, *where: travel(evidence.measured(name), *where),
         "identified": lambda: identified(evidence.identifications()),

@@ -1,13 +1,18 @@
-"""Which push next? Recorded pushes in the order that a Gaussian process asks for.
+"""Which push next? Pushes in the order that a Gaussian process asks for.
 
-From each surface a quarter of the kinds of push is kept for tests. The engine is
-identified on the first few pushes, drawn at random; then pushes of the pool are added,
-those that `choose_pushes` names or others at random, and the process is fitted again.
+From each surface, or from each virtual lab, a quarter of the kinds of push is kept for
+tests. The engine is identified on the first few pushes, drawn at random; then pushes of
+the pool are added, those that `choose_pushes` names or others at random, and the
+process is fitted again.
 """
+
+from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from sainet.control.config import CollectConfig
 from sainet.datasets.splits import last_known, split_rows
 from sainet.datasets.store import Store
 from sainet.evaluation.intervals import RESAMPLES, Estimate
@@ -23,32 +28,35 @@ from sainet.identification.identify import identify
 from sainet.learning.choosing import choose_pushes
 from sainet.learning.process import fit_to
 from sainet.learning.process_ends import Ends, ends_of
+from sainet.models.correctors.process import RESIDUALS
 from sainet.models.identity import ModelId
 from sainet.models.process_card import ProcessSettings, rates_at
 from sainet.runs.errors import BadStore
 from sainet.studies import Scale
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
 from sainet.studies.data_efficiency import of_pushes
+from sainet.studies.lab_pushes import MUJOCO, Collect
 from sainet.studies.recorded_models import surfaces_of
 from sainet.studies.runner import Runner
-from sainet.studies.steps import Apart, Given, Join
+from sainet.studies.steps import Apart, Given, Join, Step
 from sainet.studies.study import MEASUREMENTS, RECORDED, Plan, Scope, Study
 
 DRAWS = {"quick": 2, "paper": 20}
+LABS = {"quick": (1, 60), "paper": (5, 500)}  # and the pushes collected in each
 COUNTS = {"quick": (10, 20), "paper": tuple(range(25, 201, 25))}
 SETTINGS = ProcessSettings(features="place")
 TESTS = 0.25
 RANDOM, CHOSEN = (ModelId(kind="gp", name=name) for name in ("at-random", "chosen"))
 _STREAM = 0xAC71
-Errors = Float[np.ndarray, "push 2"]  # mm, degrees
+Errors = Float[np.ndarray, "push body 2"]  # mm, degrees
 
 
 class Draw(Apart[Measurements]):
-    """Errors of both orders on one surface, from one draw of tests and first pushes."""
+    """Errors of both orders of some pushes, from one draw of tests and first ones."""
 
     is_kept = True
 
-    pushes: Given
+    pushes: Step[Store]
     number: int
     scale: Scale
 
@@ -57,12 +65,12 @@ class Draw(Apart[Measurements]):
         path = runner.folder(self) / MEASUREMENTS
         if not path.is_file():
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._measure().write(path)
+            self._measure(runner.result(self.pushes)).write(path)
         return read_measurements(path)
 
-    def _measure(self) -> Measurements:
+    def _measure(self, store: Store) -> Measurements:
         """Return the errors of processes that are fitted to ever more pushes."""
-        counts, store = COUNTS[self.scale], self.pushes.store
+        counts = COUNTS[self.scale]
         pool, tests = split_rows(store.repeats(), TESTS, self.number)
         rng = np.random.default_rng([_STREAM, self.number])
         order = rng.permutation(pool)
@@ -105,8 +113,9 @@ def _missed(
 ) -> Errors:
     """Return the errors of final position (mm) and rotation (degrees)."""
     off = (ends.rates[rows] - rates) * ends.travel[rows, None]
-    place = 1000 * np.hypot(off[:, 0], off[:, 1])
-    return np.stack([place, np.rad2deg(np.abs(off[:, 2]))], axis=-1)
+    along, across, turned = np.moveaxis(off.reshape(len(off), -1, RESIDUALS), -1, 0)
+    place = 1000 * np.hypot(along, across)
+    return np.stack([place, np.rad2deg(np.abs(turned))], axis=-1)
 
 
 def _measured(
@@ -124,7 +133,7 @@ def _measured(
     parts = []
     for place, count in enumerate(counts):
         every = np.stack([found[place] for found in errors.values()])
-        of_end = {"pos_mm": every[:, None, :, :1], "rot_deg": every[:, None, :, 1:]}
+        of_end = {"pos_mm": every[:, None, ..., 0], "rot_deg": every[:, None, ..., 1]}
         both = of_end | {f"final_{name}": value for name, value in of_end.items()}
         part = measurements_of(
             both, travel, header, condition=np.zeros(len(tests)), row=tests
@@ -138,8 +147,9 @@ def _measured(
 def pushes_for_the_last(measured: Measurements, metric: str) -> Estimate:
     """Return how many chosen pushes have the error of the most pushes at random.
 
-    The error of chosen pushes is interpolated between their counts. The interval is a
-    bootstrap over draws; beyond the last count it ends there.
+    Errors are means over disks, and those of chosen pushes are interpolated between
+    their counts. The interval is a bootstrap over draws; beyond the last count it ends
+    there.
     """
     counts = [float(c.factors["training_pushes"]) for c in measured.header.conditions]
     place, draw = (measured.data[name].values for name in ("condition", "fold"))
@@ -147,9 +157,9 @@ def pushes_for_the_last(measured: Measurements, metric: str) -> Estimate:
         np.array(
             [
                 [
-                    measured.values(metric, name)
-                    .reshape(-1)[(place == number) & (draw == one)]
-                    .mean()
+                    measured.values(metric, name)[
+                        ..., (place == number) & (draw == one), :
+                    ].mean()
                     for one in np.unique(draw)
                 ]
                 for number in range(len(counts))
@@ -177,23 +187,36 @@ def saving(measured: Measurements, metric: str) -> str:
     return f"{found.value:.0f} [{found.low:.0f}, {found.high:.0f}]"
 
 
-def _plan(scope: Scope) -> Plan:
+def _recorded(scope: Scope) -> Plan:
     """Return the draws of each surface; they are the folds of the intervals."""
     store = scope.recorded_pushes()
-    return Plan(
-        Join(
-            tuple(
-                Draw(Given(store.take(rows)), number, scope.scale)
-                for rows in surfaces_of(store).values()
-                for number in range(DRAWS[scope.scale])
-            )
-        )
-    )
+    of_surfaces = [Given(store.take(rows)) for rows in surfaces_of(store).values()]
+    draws = product(of_surfaces, range(DRAWS[scope.scale]))
+    return Plan(Join(tuple(Draw(*each, scope.scale) for each in draws)))
 
 
-STUDY = Study(
+def _collected(scope: Scope) -> Plan:
+    """Return the draws in virtual labs, the same number in each."""
+    return Plan(Join(tuple(_of_labs(scope.scale))))
+
+
+def _of_labs(scale: Scale) -> Iterator[Draw]:
+    labs, pushes = LABS[scale]
+    for number in range(DRAWS[scale]):
+        config = CollectConfig(robot="lab", lab=number % labs, pushes=pushes)
+        yield Draw(Collect(config), number, scale)
+
+
+RECORDED_STUDY = Study(
     question="How many recorded pushes does a Gaussian process save that chooses them?",
-    plan=_plan,
+    plan=_recorded,
     subject=RANDOM.slug,
     needs=(RECORDED,),
+)
+LAB_STUDY = Study(
+    question="Virtual lab: how many pushes does a Gaussian process save that chooses "
+    "them?",
+    plan=_collected,
+    subject=RANDOM.slug,
+    needs=(MUJOCO,),
 )
