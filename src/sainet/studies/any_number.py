@@ -1,7 +1,7 @@
 """Any number of disks: what networks of two disks, or of one to four, predict of more.
 
 Bullet is the truth. A contact network corrects the engine with the true masses and
-radii; the paper's networks are those of Table III, trained on two disks.
+radii; the paper's networks are trained on two disks by the recipe of Table III.
 """
 
 from collections.abc import Iterator
