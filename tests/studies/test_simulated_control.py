@@ -5,9 +5,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from sainet.engines.simulator import SIMULATORS
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
+from sainet.models.identity import ModelId
 from sainet.report.arrange import arrange
 from sainet.report.writers import print_table, to_markdown
 from sainet.runs.documents import read_json
@@ -101,3 +103,20 @@ def test_the_control_table_has_every_result_once():
     lines = to_markdown(arrange(result())).splitlines()
     assert {line.count("|") for line in lines if line.startswith("|")} == {9}
     assert "| hard, tree | IN | 0/100 |" in lines[3]
+
+
+def test_a_narrow_terminal_shows_long_names_whole():
+    label = "50 pushes of a virtual lab, expected cost"
+    simulator = SIMULATORS["planar-true"]
+    known = ModelId(kind="gp", simulator=simulator, features="angle")
+    long = row(known.slug, condition=label)
+    found = Summary(
+        models=(known,), conditions=(Condition(label=label),), trials=(long,)
+    )
+    console = Console(width=80, file=None)
+    with console.capture() as capture:
+        print_table(arrange(found), console)
+    words = capture.get().split()
+    assert max(map(len, capture.get().splitlines())) <= 80
+    for word in (*label.split(), *known.label.split(), "98/100", "93%–99%", "61%"):  # noqa: RUF001
+        assert word in words

@@ -20,6 +20,7 @@ from sainet.report.table import DASH, EMPTY, Cell, Column, Line, Table
 from sainet.runs.documents import write_bytes
 
 _ANY_WIDTH = 10_000  # characters
+_LEAST_NAME = 12  # characters of a line of a name that is broken
 ESTIMATE_HEADINGS = ("parameter", "before", "value", "95 % interval")
 
 
@@ -54,10 +55,10 @@ def _blocks(table: Table) -> list[Table]:
 def _drawn(table: Table, *, is_compact: bool) -> RichTable:
     drawn = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in _leading(table):
-        is_count = heading == "n"
-        side = "right" if is_count else "left"
-        wraps = is_compact and heading == table.samples  # a long condition
-        drawn.add_column(heading.lower(), justify=side, no_wrap=not wraps)
+        # A long condition or model is broken.
+        side, wraps = ("right", False) if heading == "n" else ("left", is_compact)
+        named, least = heading.lower(), _LEAST_NAME if wraps else None
+        drawn.add_column(named, justify=side, no_wrap=not wraps, min_width=least)
     for column in table.columns:
         for heading in _rich_headings(column, is_compact=is_compact):
             drawn.add_column(Text(heading), justify="right", no_wrap=True)
