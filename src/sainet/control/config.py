@@ -136,7 +136,7 @@ class ControlConfig(RobotConfig):
         self._check_used("area_mm", is_anywhere, "`robot` is lab or abb")
         after = self.new_surface_after
         is_reached = after is None or after < self.pushes
-        self._check_used("new_surface_after", is_reached, "below `pushes`")
+        self._check_used("new_surface_after", is_reached, "it is below `pushes`")
 
 
 _GAP_MM = (0.01, 100.0)
