@@ -98,10 +98,10 @@ class ControlConfig(RobotConfig):
         require_one_of(
             "given_properties", self.given_properties, get_args(GivenProperties)
         )
-        if self.new_surface_after is not None:
-            require_count("new_surface_after", self.new_surface_after)
-            wanted = "left out if `robot` is physical; exchange its surface by hand"
-            require(not self.is_physical, "new_surface_after", wanted, self.robot)
+        if (after := self.new_surface_after) is not None:
+            require_count("new_surface_after", after)
+            wanted = "left out if `robot` is abb; exchange its surface by hand"
+            require(not self.is_physical, "new_surface_after", wanted, after)
         wrong = self.property_error
         wanted = f"from 0 to {_MOST_WRONG:g}"
         require(0 <= wrong <= _MOST_WRONG, "property_error", wanted, wrong)

@@ -50,7 +50,7 @@ ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
 GAPS_MM = (-2, -1, 0, 1, 2, 5)
 # Training pushes of each number of disks, test pushes of each condition, iterations.
 SIZES = {"quick": (48, 16, 10), "paper": (1500, 500, None)}
-TRAININGS, OF_TABLE = 5, 3  # of each network, and of those of Table III
+TRAININGS, OF_TABLE = 5, 3  # of contact networks, and of the paper's
 _TRAINING_SEED, _TEST_SEED = 100, 200
 
 
@@ -107,7 +107,7 @@ def _recipes(scope: Scope) -> Iterator[Recipe]:
 
 
 def _models(scope: Scope) -> tuple[Step[Model], ...]:
-    """Return physics, the networks of Table III, and contact networks of two disks."""
+    """Return physics, the paper's networks, and contact networks of two disks."""
     train, seeds = PaperSetup("robot", scope.scale).train, scope.seeds(OF_TABLE)
     return (*physics(), *train((IN, SAIN), seeds), *of_two(scope))
 
