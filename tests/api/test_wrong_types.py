@@ -38,8 +38,9 @@ LINES = [
     "BadSetting `iterations` is 3; it must be at least 1.",
     "BadInput recipe: iterations: expected `int`, got `float`.",
     "BadInput recipe: mirror: expected `bool`, got `str`.",
-    "UnknownName No candidate named 'foo'. Available: gp-angle, gp-place, gp-side, "
-    "sain, sain-place.",
+    "UnknownName No candidate named 'foo'. Available: gp-angle, gp-place, "
+    "gp-place-chosen, gp-side, gp-side-chosen, sain, sain-ensemble, sain-place, "
+    "sain-place-ensemble.",
 ]
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -290,8 +291,9 @@ def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
 def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
     out = tmp_path / "gp"
     words = ("tune", "gp", "--data", pushes, "--engine", "planar", "--out", out)
-    done = sainet(*words, "--iterations", 2, "--quiet", "--json")
+    done = sainet(*words, "--iterations", 2, "--choose", "--json")
     assert json.loads(done.stdout.splitlines()[-1])["model"] == "gp"
+    assert re.search("Chosen: features (angle|side), kernel [a-z]+", done.stderr)
     error = sainet("evaluate", "--model", out, "--data", pushes, status=2).stderr
     assert "trained on" in error
     given = ("--model", "physics", out, "--data", pushes, "--force", "--json")
@@ -311,6 +313,8 @@ def test_a_gaussian_process_is_fitted_and_evaluated(pushes, tmp_path):
     words = ("tune", "sain", "--data", pushes, "--out", tmp_path / "net")
     error = sainet(*words, "--features", "side", status=2).stderr
     assert "--features is side; it must be paper, place or contact for a" in error
+    error = sainet(*words, "--choose", status=2).stderr
+    assert "--choose is True; it must be left out: it is a setting of gp" in error
 
 
 def test_a_network_of_another_time_step_is_refused(pushes, tmp_path):

@@ -169,7 +169,7 @@ def without_what_takes_long(monkeypatch):
             name: (values[name], values[name]) for name in free
         },
         "learning.fit.make_step": lambda *a: next_iteration,
-        "learning.process._most_probable": lambda inputs, *a: (
+        "learning.process_fit._most_probable": lambda inputs, *a: (
             np.zeros(2 + inputs.shape[1]),
             0.0,
         ),

@@ -16,15 +16,18 @@ import sainet as sn
 from learning.stores import info_of, made_up
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.generate import generate
+from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import MISSED, coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
-from sainet.learning.process import _loss_and_slope, fit_process, quantile
+from sainet.learning.process import fit_process, fits_of, quantile
 from sainet.learning.process_ends import ends_of
+from sainet.learning.process_fit import fit_to, loss_and_slope
 from sainet.models.correctors import CONFIDENCE, Region
-from sainet.models.correctors.process import covariance
+from sainet.models.correctors.kernels import KERNELS
+from sainet.models.correctors.process import correlation
 from sainet.models.library import load_model
 from sainet.models.process_card import (
     ARRAYS,
@@ -360,26 +363,35 @@ def test_its_report_says_what_it_is(folder):
 def test_settings_of_networks_are_refused(store):
     with pytest.raises(BadInput, match="`recipe` and `start` are of networks"):
         sn.tune("gp", store, start="sain")
-    with pytest.raises(BadInput, match="`features` is of `gp`"):
+    with pytest.raises(BadInput, match="`features` and `choose` are of `gp`"):
         sn.tune("sain", store, features="side")
 
 
+# The same kernels of another library.
+REFERENCES = {
+    "matern-3/2": kernels.Matern32(distance=L2Distance()),
+    "matern-5/2": kernels.Matern52(distance=L2Distance()),
+    "squared-exponential": kernels.ExpSquared(),
+}
+every_kernel = pytest.mark.parametrize("name", KERNELS)
+
+
+@every_kernel
 @pytest.mark.parametrize("inputs", [1, 3])
 @pytest.mark.parametrize("pushes", [1, 5, 40])
-def test_the_loss_is_the_density_of_scipy(pushes, inputs):
+def test_the_loss_is_the_density_of_scipy(pushes, inputs, name):
     rng = np.random.default_rng(pushes)
     places, values = rng.normal(size=(pushes, inputs)), rng.normal(size=pushes)
     at = np.array([0.1, -0.7, *[1.0] * inputs])
 
     def wanted(at):
-        matern = kernels.Matern32(distance=L2Distance())
-        kernel = jnp.exp(2 * at[0]) * transforms.Linear(jnp.exp(-at[2:]), matern)
-        covariance = np.asarray(kernel(jnp.asarray(places), jnp.asarray(places)))
-        covariance = covariance + np.exp(2 * at[1]) * np.eye(pushes)
+        scaled = transforms.Linear(jnp.exp(-at[2:]), REFERENCES[name])
+        covariance = jnp.exp(2 * at[0]) * scaled(places, places)
+        covariance = np.asarray(covariance) + np.exp(2 * at[1]) * np.eye(pushes)
         return -multivariate_normal(cov=covariance).logpdf(values)
 
     with jax.enable_x64(True):
-        found, slope = _loss_and_slope(at, places, values, prior=at)
+        found, slope = loss_and_slope(at, places, values, name, prior=at)
         assert found == pytest.approx(wanted(at))
         for place in range(len(at)):
             step = 1e-5 * np.eye(len(at))[place]
@@ -387,14 +399,37 @@ def test_the_loss_is_the_density_of_scipy(pushes, inputs):
             assert slope[place] == pytest.approx(about, rel=1e-4, abs=1e-5)
 
 
-def test_a_covariance_has_a_slope_where_points_coincide():
+@every_kernel
+def test_a_correlation_has_a_slope_where_points_coincide(name):
     places = jnp.asarray(np.random.default_rng(0).normal(size=(4, 3)), jnp.float32)
-
-    def total(other):
-        return covariance(jnp.float32(1.5), places, other).sum()
-
-    matern = kernels.Matern32(distance=L2Distance())
-    slope = jax.grad(total)(places)
-    wanted = jax.grad(lambda other: (2.25 * matern(places, other)).sum())(places)
+    slope = jax.grad(lambda other: correlation(name, places, other).sum())(places)
+    wanted = jax.grad(lambda other: REFERENCES[name](places, other).sum())(places)
     np.testing.assert_allclose(slope, wanted, atol=1e-5)
     assert np.abs(wanted).max() > 0.1
+
+
+def test_a_choice_takes_the_best_on_pushes_left_out(store, tmp_path):
+    allowed = ProcessSettings(features="side", iterations=8, folds=2, choose=True)
+    some, calls, out = store.first(24), [], tmp_path / "gp"
+    fit_process(some, out, PLANAR, allowed, on_output=lambda: calls.append(0))
+    assert len(calls) == fits_of(some, allowed) == 6 * 2 * 3 * 3
+    found = load_model(str(out)).card
+    assert found.recipe in allowed.options
+    assert found.identity.features == found.recipe.features
+
+    def missed(settings):
+        ends = ends_of(some, PLANAR, settings.features)
+        owner, off = fold_of_push(ends.kinds, 2, 0), np.empty_like(ends.rates)
+        whole, _ = fit_to(ends, settings)
+        at = np.log(np.c_[whole.amplitude, np.sqrt(whole.noise), whole.length])
+        for fold in range(2):
+            part, _ = fit_to(ends.take(owner != fold), settings, begin=at)
+            held = owner == fold
+            off[held] = ends.rates[held] - rates_at(part, ends.inputs[held])[0]
+        off, whole = (x.reshape(len(x), 2, 3) for x in (off, ends.rates))
+        place = np.hypot(*off.T[:2]).mean(axis=1) / np.hypot(*whole.T[:2]).mean(axis=1)
+        turned = np.abs(off[..., 2]).mean(axis=0) / np.abs(whole[..., 2]).mean(axis=0)
+        return np.mean([place, turned])
+
+    best = min(allowed.options, key=missed)
+    assert (found.recipe.features, found.recipe.kernel) == (best.features, best.kernel)

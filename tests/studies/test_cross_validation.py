@@ -20,11 +20,10 @@ from sainet.models.identity import ModelId
 from sainet.models.process_card import read_process_card
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadStore
-from sainet.studies.cross_validation import (
-    ProcessCandidate,
-    candidates_named,
-    cross_validated,
-)
+from sainet.studies.candidates import ProcessCandidate, candidates_named
+from sainet.studies.cross_validation import cross_validated
+from sainet.studies.runner import Runner
+from sainet.studies.validation import cross_validate
 
 PUSHES, FOLDS = 64, 2
 MODELS = ("physics", "physics-identified", "gp-identified-angle")
@@ -184,6 +183,37 @@ def test_the_next_commands_are_for_the_pushes_of_the_verdict():
     )
 
 
+def test_the_next_command_makes_a_model_as_it_was_validated():
+    data = {"d": 9}
+    for name, model, option in (
+        ("gp-side-chosen", "tune gp --features side", " --choose"),
+        ("sain-place-ensemble", "tune sain --features place", "--members 5"),
+    ):
+        (found,) = candidates_named([name])
+        (one,) = CrossValidate(data=Path("d"))._commands(found.identity, data)
+        assert model in one
+        assert option in one
+
+
+def test_ensembles_and_chosen_processes_are_compared(recorded, tmp_path, monkeypatch):
+    from sainet.studies import candidates
+
+    monkeypatch.setattr(candidates, "MEMBERS", 2)
+    few = candidates.RESIDUAL.changed(iterations=2)
+    monkeypatch.setattr(candidates, "RESIDUAL", few)
+    monkeypatch.setattr("sainet.learning.ensemble._FEWEST", 3)
+    store = open_store(recorded).of_group("wood")
+    models = candidates_named(["sain-ensemble", "gp-side-chosen"])
+    found = cross_validate(store, ("kind",), FOLDS, models, Runner(tmp_path))
+    assert found.order[2:] == [
+        "sain-identified-residual-ensemble",
+        "gp-identified-side-chosen",
+    ]
+    for slug in found.order[2:]:
+        assert np.isfinite(found.measured.values("final_pos_mm", slug)).all()
+        assert any(slug in sentence for sentence in found.coverage)
+
+
 def test_candidates_come_from_the_simplest():
     found = candidates_named(["gp-place", "gp-angle"])
     assert found == (ProcessCandidate("angle"), ProcessCandidate("place"))
@@ -194,3 +224,5 @@ def test_pushes_that_a_candidate_cannot_be_fitted_to_are_refused_at_once(tmp_pat
     store = write(tmp_path / "three", info, end_points_alone(made_up(info)))
     with pytest.raises(BadStore, match="3 disks.*train a network"):
         cross_validated(store, ("kind",), FOLDS, candidates_named(["gp-angle"]))
+    with pytest.raises(BadStore, match="20 pushes, of which 4 would calibrate"):
+        candidates_named(["sain-ensemble"])[0].check(store.first(20))

@@ -74,6 +74,7 @@ def tune(
     *,
     engine: Loadable | None = None,
     features: ProcessFeatures | None = None,
+    choose: bool = False,
     start: Folder | Model = FROM_ENGINE,
     recipe: Recipe | None = None,
     iterations: int | None = None,
@@ -93,6 +94,8 @@ def tune(
         features: inputs of a Gaussian process, each with those before: `angle` (of the
             contact), `side` (of the disk), `place` (on the table). None: `side`. For
             a network give `recipe` other features.
+        choose: choose the kernel of a Gaussian process, and its inputs up to
+            `features`, by cross-validation on the pushes: up to nine times as long.
         start: of a network. `engine` starts as the internal engine, with a network that
             adds nothing to its motion at first; otherwise a network to train further:
             shipped, its folder, or a model with a folder.
@@ -118,14 +121,13 @@ def tune(
     if model == "gp":
         if recipe is not None or start != FROM_ENGINE:
             raise BadInput("`recipe` and `start` are of networks; leave them out.")
-        chosen = {
-            k: v for k, v in {**given, "features": features}.items() if v is not None
-        }
+        given |= {"features": features, "choose": choose}
+        known = {k: v for k, v in given.items() if v is not None}
         require_one_of("features", features or "side", get_args(ProcessFeatures))
-        settings = checked(ProcessSettings(**cast(Any, chosen)), "gp")
+        settings = checked(ProcessSettings(**cast(Any, known)), "gp")
         return _fitted(store_of(pushes), settings, engine, out, progress)
-    if features is not None:
-        raise BadInput("`features` is of `gp`; give `recipe` those of a network.")
+    if features is not None or choose:
+        raise BadInput("`features` and `choose` are of `gp`; change the `recipe`.")
     begun = _recipe(start, recipe)
     settings = begun.changed(**{k: v for k, v in given.items() if v is not None})
     total = settings.optimiser.iterations

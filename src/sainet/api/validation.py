@@ -17,7 +17,7 @@ from sainet.evaluation.recommendation import Recommendation
 from sainet.report.table import Table
 from sainet.runs.errors import require, require_one_of
 from sainet.studies import USUAL_CANDIDATES, CandidateName
-from sainet.studies.cross_validation import candidates_named
+from sainet.studies.candidates import candidates_named
 from sainet.studies.runner import Progress, Runner
 from sainet.studies.study import STEPS
 from sainet.studies.validation import Validation
@@ -68,8 +68,10 @@ def cross_validate(
             pushes that start where another one ended; `place`, `direction`, `side` (of
             the disk) and `order` (of recording) test where nothing was learned.
         folds: number of folds, at least 2.
-        models: learned models: Gaussian processes (`gp-angle`, `gp-side`, `gp-place`)
-            and networks (`sain`, `sain-place`).
+        models: learned models: Gaussian processes (`gp-angle`, `gp-side`, `gp-place`;
+            with `-chosen`, the inputs up to these and the kernel are chosen in each
+            fold) and networks (`sain`, `sain-place`; with `-ensemble`, the mean of
+            five with regions).
         out: folder of the fitted models; an identical call resumes. None: a temporary
             folder, deleted at the end.
         progress: show progress bars; None: on a terminal.

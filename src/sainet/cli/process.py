@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sainet.models.process_card import ProcessSettings
 
 Given = Mapping[str, object]
-_OF_PROCESSES = {"features", "iterations", "seed"}
+_OF_PROCESSES = {"choose", "features", "iterations", "seed"}
 _UNUSED = {
     "start": FROM_ENGINE,
     "devices": None,
@@ -75,6 +75,9 @@ class ProcessJob:
                 on_output=lambda: advance(1, ""),
             )
         card = read_process_card(self.out)
+        if settings.choose:
+            found = card.recipe
+            output.say(f"Chosen: features {found.features}, kernel {found.kernel}")
         output.say(f"The Gaussian process of {card.trained_pushes} pushes: {self.out}")
         return {"out": str(self.out), "model": "gp", "loss": card.final_loss}
 
@@ -95,9 +98,11 @@ def for_networks(changes: Given) -> Given:
     """Return settings of a network.
 
     Raises:
-        BadSetting: its features are those of a process.
+        BadSetting: its features are those of a process, or are to be chosen.
     """
     features = changes.get("features", "paper")
     if features not in get_args(Features):
         raise BadSetting("features", features, "paper, place or contact for a network")
-    return changes
+    if changes["choose"]:
+        raise BadSetting("choose", True, "left out: it is a setting of gp")
+    return {name: value for name, value in changes.items() if name != "choose"}

@@ -59,6 +59,9 @@ class Changes:
     Gaussian process: angle is the contact angle; side adds the side of the disk; place
     adds the side, and the position and directions on the table (default: paper; side
     for a Gaussian process)."""
+    choose: bool = False
+    """Choose the kernel of a Gaussian process, and its inputs up to the given features,
+    by cross-validation on the pushes (takes up to nine times as long)."""
     seed: int = RESIDUAL.seed
     """Random seed."""
     log_every: int = RESIDUAL.log_every

@@ -8,12 +8,13 @@ import equinox as eqx
 import jax.numpy as jnp
 import msgspec
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch, to_batch
 from sainet.datasets.splits import last_known, split_rows
 from sainet.datasets.store import Store
 from sainet.engines.devices import is_one_gpu
+from sainet.engines.simulator import InternalEngine
 from sainet.learning.fit import complete
 from sainet.learning.job import Job, begin
 from sainet.learning.log import read_log
@@ -45,7 +46,7 @@ def fit_ensemble(
     out: Path,
     *,
     members: int,
-    assumed_engine: str = "planar",
+    assumed_engine: str | InternalEngine = "planar",
     on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
 ) -> float | None:
     """Train networks of consecutive seeds, then calibrate the regions of their mean.
@@ -75,16 +76,13 @@ def fit_ensemble(
         raise BadSetting("members", members, f"from {low} to {high}")
     if isinstance(recipe.horizon, SingleSteps):
         raise BadSetting("members", members, "left out for networks of single steps")
-    rest, held = split_rows(store.repeats(), CALIBRATION, recipe.seed)
-    if len(held) < _FEWEST:
-        raise BadStore(
-            f"{store.path}: {store.info.pushes} pushes, of which {len(held)} would "
-            f"calibrate the ensemble; it needs at least {_FEWEST} of these."
-        )
+    rest, held = divided(store, recipe.seed)
     objective = recipe.objective.for_pushes(len(rest))
     settings = msgspec.to_builtins(recipe.changed(l2=objective.l2).settings())
     config = {"command": "train", "model": model, "members": members}
-    config |= {"data": store.content, "engine": str(assumed_engine), **settings}
+    is_named = isinstance(assumed_engine, str)
+    engine = assumed_engine if is_named else msgspec.to_builtins(assumed_engine)
+    config |= {"data": store.content, "engine": engine, **settings}
     folder = open_run(out, config, finished_by=ENSEMBLE)
     training = store.take(np.sort(rest))
 
@@ -107,6 +105,23 @@ def fit_ensemble(
         )
         write_document(out / ENSEMBLE, card)
     return loss
+
+
+def divided(
+    store: Store, seed: int
+) -> tuple[Int[np.ndarray, " trained"], Int[np.ndarray, " held"]]:
+    """Return the rows of pushes that train all members, and of those that calibrate.
+
+    Raises:
+        BadStore: the latter do not suffice.
+    """
+    rest, held = split_rows(store.repeats(), CALIBRATION, seed)
+    if len(held) < _FEWEST:
+        raise BadStore(
+            f"{store.path}: {store.info.pushes} pushes, of which {len(held)} would "
+            f"calibrate the ensemble; it needs at least {_FEWEST} of these."
+        )
+    return rest, held
 
 
 def _train(

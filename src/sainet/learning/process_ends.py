@@ -14,6 +14,7 @@ from sainet.engines.simulator import InternalEngine
 from sainet.models.correctors.process import RESIDUALS, known_inputs, travel_of
 from sainet.models.identity import ProcessFeatures
 from sainet.models.inputs import push_frame
+from sainet.models.process_card import up_to
 from sainet.runs.errors import BadInput, BadStore
 from sainet.scenes.recording import AGREES, CameraOffset
 
@@ -44,6 +45,13 @@ class Ends:
         return replace(
             self, inputs=inputs, rates=rates, travel=travel, kinds=self.kinds[rows]
         )
+
+    def with_features(self, features: ProcessFeatures) -> "Ends":
+        """Return the ends with the inputs of these features only."""
+        known = tuple(prefix for each in up_to(features) for prefix in ADDED[each])
+        columns = [i for i, key in enumerate(self.names) if key.startswith(known)]
+        names = tuple(self.names[i] for i in columns)
+        return replace(self, names=names, inputs=self.inputs[:, columns])
 
 
 def inputs_of(
@@ -130,9 +138,8 @@ def _varying(
     Raises:
         BadInput: none of those that were asked for does.
     """
-    every: list[ProcessFeatures] = [*ADDED]
     found: list[str] = []
-    for each in every[: every.index(features) + 1]:
+    for each in up_to(features):
         varying = [
             key
             for key, values in inputs.items()

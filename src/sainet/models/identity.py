@@ -37,6 +37,7 @@ Variant = Literal[
     "loss-in-metres",
     "large-l2",
     "small-l2",
+    "chosen",
 ]
 
 NETWORKS = get_args(ModelKind)

@@ -1,8 +1,9 @@
 """Gaussian processes on disk: their card, and their arrays in a file of their own."""
 
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, get_args
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import msgspec
@@ -13,6 +14,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from sainet.engines.simulator import InternalEngine
 from sainet.models.card import Count
 from sainet.models.checkpoint import load_arrays
+from sainet.models.correctors.kernels import KERNELS, KernelName
 from sainet.models.correctors.process import (
     BODIES,
     RESIDUALS,
@@ -38,9 +40,30 @@ class ProcessSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How a process was fitted."""
 
     features: ProcessFeatures = "side"
+    kernel: KernelName = "matern-3/2"
+    # Whether kernel and features were chosen, of all kernels and of features up to
+    # those that were allowed.
+    choose: bool = False
     iterations: Count = 50  # of the optimiser, at most, for each output
     seed: Annotated[int, msgspec.Meta(ge=0)] = 0
     folds: Annotated[int, msgspec.Meta(ge=2)] = 5  # that calibrate its uncertainty
+
+    @property
+    def options(self) -> tuple["ProcessSettings", ...]:
+        """All settings to choose from; without a choice, only these."""
+        if not self.choose:
+            return (self,)
+        return tuple(
+            msgspec.structs.replace(self, features=features, kernel=kernel)
+            for features in up_to(self.features)
+            for kernel in KERNELS
+        )
+
+
+def up_to(features: ProcessFeatures) -> tuple[ProcessFeatures, ...]:
+    """Return features and all those with fewer inputs, from the fewest."""
+    every: tuple[ProcessFeatures, ...] = get_args(ProcessFeatures)
+    return every[: every.index(features) + 1]
 
 
 class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
@@ -91,7 +114,7 @@ class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
         return None if simulator is None else InternalEngine(simulator, self.camera)
 
 
-class Fitted(NamedTuple):
+class Fitted(eqx.Module):
     """The arrays of a process, in double precision; `Process` has their meanings."""
 
     inputs: Float[np.ndarray, "push input"]  # standardised
@@ -105,6 +128,7 @@ class Fitted(NamedTuple):
     width: Float[np.ndarray, " input"]
     reach: Float[np.ndarray, "body 2"]
     plain: Float[np.ndarray, "body 2"]
+    kernel: KernelName = eqx.field(static=True, default="matern-3/2")
 
 
 def corrector_of(
@@ -126,6 +150,7 @@ def corrector_of(
     process = Process(
         weights=single(np.stack(weights)),
         whitening=single(np.stack(whitening)),
+        kernel=fitted.kernel,
         **{name: single(getattr(fitted, name)) for name in same},
     )
     same = ("centre", "width", "reach", "plain")
@@ -150,9 +175,9 @@ def covariance_between(
     other: Float[np.ndarray, "other input"],
 ) -> Float[np.ndarray, "one other"]:
     """Return the prior covariance of an output at standardised inputs, no noise."""
-    length = fitted.length[output]
-    far = np.sqrt(3 * squared_distances(one / length, other / length))
-    return fitted.amplitude[output] ** 2 * (1 + far) * np.exp(-far)
+    length, (factor, of) = fitted.length[output], KERNELS[fitted.kernel]
+    far = np.sqrt(factor * squared_distances(one / length, other / length))
+    return fitted.amplitude[output] ** 2 * of(far, np.exp)[0]
 
 
 def squared_distances(
@@ -229,7 +254,8 @@ def read_process(folder: Path) -> tuple[Fitted, ProcessCard]:
         width=np.empty(inputs),
         reach=np.empty((card.disks, 2)),
         plain=np.empty((card.disks, 2)),
+        kernel=card.recipe.kernel,
     )
     with jax.enable_x64(True):
         arrays = load_arrays(folder / ARRAYS, like, _REMEDY, known=card.weights)
-    return Fitted(*map(np.asarray, arrays)), card
+    return jax.tree.map(np.asarray, arrays), card

@@ -9,8 +9,18 @@ if TYPE_CHECKING:
     from sainet.studies.study import Study
 
 Scale = Literal["quick", "paper"]
-# Learned models that a cross-validation compares, see `studies.cross_validation`.
-CandidateName = Literal["gp-angle", "gp-side", "gp-place", "sain", "sain-place"]
+# Learned models that a cross-validation compares, see `studies.candidates`.
+CandidateName = Literal[
+    "gp-angle",
+    "gp-side",
+    "gp-side-chosen",
+    "gp-place",
+    "gp-place-chosen",
+    "sain",
+    "sain-ensemble",
+    "sain-place",
+    "sain-place-ensemble",
+]
 USUAL_CANDIDATES: tuple[CandidateName, ...] = (
     *("sain", "gp-side", "sain-place", "gp-place"),
 )
@@ -45,6 +55,7 @@ STUDIES = {
     "fine-tuning": "sainet.studies.fine_tuning:STUDY",
     "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
     "recorded-trust": "sainet.studies.recorded_trust:STUDY",
+    "recorded-chosen": "sainet.studies.recorded_trust:CHOSEN_STUDY",
     "recorded-few": "sainet.studies.recorded_few:STUDY",
     "recorded-active": "sainet.studies.active_choice:RECORDED_STUDY",
     "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",

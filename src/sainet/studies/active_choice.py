@@ -26,8 +26,8 @@ from sainet.evaluation.measurements import (
 from sainet.evaluation.metrics import REFERENCE_DISTANCE, travel_mm
 from sainet.identification.identify import identify
 from sainet.learning.choosing import choose_pushes
-from sainet.learning.process import fit_to
 from sainet.learning.process_ends import Ends, ends_of
+from sainet.learning.process_fit import fit_to
 from sainet.models.correctors.process import RESIDUALS
 from sainet.models.identity import ModelId
 from sainet.models.process_card import ProcessSettings, rates_at

@@ -5,11 +5,8 @@ scales of inputs and outputs, hyperparameters, weights, and the quantiles of reg
 surface has models of its own, like a robot at one table.
 """
 
-import abc
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from types import MappingProxyType
+from collections.abc import Sequence
+from dataclasses import replace
 
 from msgspec import structs
 
@@ -17,23 +14,16 @@ from sainet.datasets import Scheme
 from sainet.datasets.folds import folds_by
 from sainet.datasets.splits import folds_of
 from sainet.datasets.store import Store
-from sainet.engines.simulator import InternalEngine
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import Condition, Measurements, read_measurements
 from sainet.identification.identify import check_store as check_observed
 from sainet.identification.identify import identify_into
-from sainet.learning.fit import fit
-from sainet.learning.process import check_store, fit_process
-from sainet.learning.process_ends import check_inputs
-from sainet.learning.recipes import RESIDUAL
 from sainet.models.card import read_identified
-from sainet.models.identity import Features, ModelId, ProcessFeatures
+from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
-from sainet.models.process_card import ProcessSettings
-from sainet.runs.errors import unknown_name
-from sainet.studies import CandidateName
+from sainet.studies.candidates import Candidate
 from sainet.studies.recorded_models import IDENTIFIED, surfaces_of
 from sainet.studies.recorded_pushes import JoinFolds
 from sainet.studies.runner import Runner
@@ -60,97 +50,6 @@ class FitEngine(Apart[Model]):
         folder = runner.folder(self)
         identify_into(self.pushes.store, folder)
         return replace(load_model(str(folder)), id=PHYSICS_IDENTIFIED)
-
-
-@dataclass(frozen=True)
-class Candidate(abc.ABC):
-    """A model that learns what the identified engine gets wrong."""
-
-    @property
-    @abc.abstractmethod
-    def identity(self) -> ModelId:
-        """The identity in tables."""
-
-    @abc.abstractmethod
-    def check(self, store: Store) -> None:
-        """Raise `BadStore` or `BadInput` if the model cannot be fitted to pushes."""
-
-    @abc.abstractmethod
-    def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
-        """Fit the model to pushes, around an engine, unless the folder has it."""
-
-
-@dataclass(frozen=True)
-class ProcessCandidate(Candidate):
-    """A Gaussian process."""
-
-    features: ProcessFeatures
-
-    @property
-    def identity(self) -> ModelId:
-        """The identity in tables."""
-        return ModelId(kind="gp", simulator=IDENTIFIED, features=self.features)
-
-    @property
-    def settings(self) -> ProcessSettings:
-        """How it is fitted."""
-        return ProcessSettings(features=self.features)
-
-    def check(self, store: Store) -> None:
-        """Refuse too few pushes, too many disks, and inputs that do not vary."""
-        check_store(store, self.settings)
-        check_inputs(store, self.features)
-
-    def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
-        """Fit the process."""
-        fit_process(store, folder, internal, self.settings)
-
-
-@dataclass(frozen=True)
-class NetworkCandidate(Candidate):
-    """An additive network around the engine."""
-
-    features: Features
-
-    @property
-    def identity(self) -> ModelId:
-        """The identity in tables."""
-        return ModelId(
-            kind="sain", simulator=IDENTIFIED, data="residual", features=self.features
-        )
-
-    def check(self, store: Store) -> None:
-        """Accept all pushes that an engine can be identified on."""
-
-    def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
-        """Train the network."""
-        batch = min(RESIDUAL.optimiser.batch_size, store.info.pushes)
-        recipe = RESIDUAL.changed(features=self.features, batch_size=batch)
-        fit("sain", store, recipe, folder, assumed_engine=internal)
-
-
-# From the simplest to the one that needs most: the same table and the same disk.
-CANDIDATES: Mapping[CandidateName, Candidate] = MappingProxyType(
-    {
-        "gp-angle": ProcessCandidate("angle"),
-        "sain": NetworkCandidate("paper"),
-        "gp-side": ProcessCandidate("side"),
-        "sain-place": NetworkCandidate("place"),
-        "gp-place": ProcessCandidate("place"),
-    }
-)
-
-
-def candidates_named(names: Sequence[str]) -> tuple[Candidate, ...]:
-    """Return candidates, from the simplest.
-
-    Raises:
-        UnknownName: there is no candidate of a name.
-    """
-    for name in names:
-        if name not in CANDIDATES:
-            raise unknown_name("candidate", name, CANDIDATES)
-    return tuple(each for name, each in CANDIDATES.items() if name in names)
 
 
 class FitCandidate(Apart[Model]):

@@ -144,4 +144,6 @@ def _(step: Step[Any]) -> Effort:
 
 @effort.register
 def _(step: cross_validation.FitCandidate) -> Effort:
-    return Effort(f"Fit {step.candidate.identity.kind}", _extent(step.engine).pushes)
+    identity, pushes = step.candidate.identity, _extent(step.engine).pushes
+    words = filter(None, ("Fit", identity.kind, identity.variant))
+    return Effort(" ".join(words), pushes)

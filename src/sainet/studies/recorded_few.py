@@ -10,9 +10,9 @@ from itertools import product
 from sainet.datasets.splits import make_folds
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.margins import errs_at_most_more
+from sainet.studies.candidates import ProcessCandidate
 from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
-    ProcessCandidate,
     fitted_and_tested,
 )
 from sainet.studies.data_efficiency import first_pushes, of_pushes

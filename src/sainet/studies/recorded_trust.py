@@ -8,6 +8,7 @@ abstain: the engine with assumed properties predicts there.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -24,10 +25,10 @@ from sainet.evaluation.measurements import Condition, Measurements
 from sainet.evaluation.summary import BASELINE
 from sainet.learning.process_ends import ADDED
 from sainet.models.identity import ModelId
+from sainet.studies.candidates import ChosenProcess, ProcessCandidate
 from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
     EvaluateFitted,
-    ProcessCandidate,
     WithUnions,
     cross_validated,
     fitted_and_tested,
@@ -38,6 +39,7 @@ from sainet.studies.study import RECORDED, Plan, Scope, Study
 
 FOLDS = {"quick": 2, "paper": 5}
 PROCESSES = tuple(ProcessCandidate(features) for features in ADDED)
+CHOSEN = (ChosenProcess("side"), ChosenProcess("place"))
 FITTED = (PHYSICS_IDENTIFIED, *(each.identity for each in PROCESSES))
 MOST = 0.03  # share by which a model that abstains may err more than the engine
 
@@ -71,15 +73,24 @@ class WithAbstaining(Step[Measurements]):
 
 def _plan(scope: Scope) -> Plan:
     """Return processes that are fitted to each fold, and on each surface for others."""
-    store, is_whole = scope.recorded_pushes(), scope.scale == "paper"
-    schemes = ("kind", *BLOCKED) if is_whole else ("kind",)
-    count = FOLDS[scope.scale]
-    parts, unions = cross_validated(store, schemes, count, PROCESSES)
-    if not is_whole:
-        return Plan(WithUnions(tuple(parts), tuple(unions)))
-    parts += _elsewhere(store)
-    measured = WithUnions(tuple(parts), tuple(unions))
+    within, store = _within(scope, PROCESSES), scope.recorded_pushes()
+    if scope.scale != "paper":
+        return Plan(within)
+    measured = replace(within, parts=(*within.parts, *_elsewhere(store)))
     return Plan(WithAbstaining(measured, FITTED, _other_surfaces(store.info.groups)))
+
+
+def _chosen(scope: Scope) -> Plan:
+    """Return processes whose inputs and kernel are chosen in each fold."""
+    return Plan(_within(scope, CHOSEN))
+
+
+def _within(scope: Scope, models: Sequence[ProcessCandidate]) -> WithUnions:
+    """Return the measurements of all divisions into folds."""
+    schemes = ("kind", *BLOCKED) if scope.scale == "paper" else ("kind",)
+    pushes, count = scope.recorded_pushes(), FOLDS[scope.scale]
+    parts, unions = cross_validated(pushes, schemes, count, models)
+    return WithUnions(tuple(parts), tuple(unions))
 
 
 def _elsewhere(store: Store) -> Iterator[EvaluateFitted]:
@@ -104,26 +115,32 @@ def _label(trained: str, tested: str) -> str:
     return f"{trained} to {tested}"
 
 
-STUDY = Study(
-    question="On recorded pushes, does a Gaussian process around the identified engine "
-    "err less than the engine, and does it know how sure it is?",
-    plan=_plan,
-    subject=PHYSICS_IDENTIFIED.slug,
-    claims=tuple(
+def _errs_less_than_the_engine(
+    models: Sequence[ProcessCandidate], words: str
+) -> tuple[Claim, ...]:
+    return tuple(
         Claim(
-            f"a Gaussian process ({each.features}) around the identified engine errs "
-            f"less than it alone, folds by {scheme}",
+            f"a Gaussian process ({each.features}{words}) around the identified engine "
+            f"errs less than it alone, folds by {scheme}",
             errs_less(
                 each.identity.slug,
-                "physics-identified",
+                PHYSICS_IDENTIFIED.slug,
                 condition=scheme,
                 metrics=("final_pos_mm", "final_rot_deg"),
             ),
         )
         for scheme in (*BLOCKED, "kind")
-        for each in PROCESSES
+        for each in models
         if each.features != "angle"
     )
+
+
+STUDY = Study(
+    question="On recorded pushes, does a Gaussian process around the identified engine "
+    "err less than the engine, and does it know how sure it is?",
+    plan=_plan,
+    subject=PHYSICS_IDENTIFIED.slug,
+    claims=_errs_less_than_the_engine(PROCESSES, "")
     + tuple(
         Claim(
             f"on the other surface {each.abstaining.slug} errs at most "
@@ -132,5 +149,13 @@ STUDY = Study(
         )
         for each in FITTED
     ),
+    needs=(RECORDED,),
+)
+CHOSEN_STUDY = Study(
+    question="On recorded pushes, how well does a Gaussian process predict whose "
+    "inputs and kernel are chosen without the test pushes?",
+    plan=_chosen,
+    subject=PHYSICS_IDENTIFIED.slug,
+    claims=_errs_less_than_the_engine(CHOSEN, " at most, chosen in each fold"),
     needs=(RECORDED,),
 )

@@ -19,9 +19,9 @@ from sainet.report.arrange import arrange
 from sainet.report.pages.page import REPORT, Report, write_report
 from sainet.report.recommending import verdict
 from sainet.report.table import Table
+from sainet.studies.candidates import Candidate
 from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
-    Candidate,
     WithUnions,
     cross_validated,
 )

@@ -1,7 +1,7 @@
 """A Gaussian process on what an engine gets wrong by the end of a push.
 
 Each residual (along and across the push, and in angle, of each body) is a Gaussian
-process of the start of the push: Matern 3/2, one length scale for each input, noise.
+process of the start of the push: a kernel with one length scale for each input, noise.
 It grows in proportion to the travel of the pusher, and has a value at every step.
 """
 
@@ -16,6 +16,7 @@ from sainet.models.correctors import (
     Region,
     Start,
 )
+from sainet.models.correctors.kernels import KERNELS, KernelName
 from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import direction, norm, rotate, unit, wrap_angle
@@ -101,6 +102,7 @@ class Process(eqx.Module):
     whitening: Float[Array, "output push push"]  # inverse Cholesky factor of it
     mean: Float[Array, " output"]
     scale: Float[Array, " output"]
+    kernel: KernelName = eqx.field(static=True, default="matern-3/2")
 
     def __call__(
         self, inputs: Float[Array, "push input"]
@@ -108,31 +110,33 @@ class Process(eqx.Module):
         """Return the mean and the standard deviation of each output, with its noise."""
         means, deviations = [], []
         for output in range(self.mean.shape[0]):
-            amplitude, length = self.amplitude[output], self.length[output, None]
-            across = covariance(amplitude, self.inputs / length, inputs / length)
+            variance, length = self.amplitude[output] ** 2, self.length[output, None]
+            near = correlation(self.kernel, self.inputs / length, inputs / length)
+            across = variance * near
             known = jnp.sum((self.whitening[output] @ across) ** 2, axis=0)
-            left = self.amplitude[output] ** 2 - known
+            left = variance - known
             means.append(self.weights[output] @ across)
             deviations.append(jnp.sqrt(jnp.maximum(left, 0.0) + self.noise[output]))
         mean, deviation = jnp.stack(means, -1), jnp.stack(deviations, -1)
         return self.mean[None] + self.scale[None] * mean, self.scale[None] * deviation
 
 
-def covariance(
-    amplitude: Float[Array, ""],
+def correlation(
+    kernel: KernelName,
     one: Float[Array, "one input"],
     other: Float[Array, "other input"],
 ) -> Float[Array, "one other"]:
-    """Return the Matern 3/2 covariance of points whose length scales are 1.
+    """Return the prior correlation of points whose length scales are 1.
 
-    Rasmussen and Williams (2006), eq. 4.17. One product of matrices gives all squared
-    distances, in a quarter of the time of their differences.
+    One product of matrices gives all squared distances, in a quarter of the time of
+    their differences.
     """
     sizes = jnp.sum(one**2, axis=1)[:, None] + jnp.sum(other**2, axis=1)[None]
-    squares = 3 * (sizes - 2 * one @ other.T)
+    factor, of = KERNELS[kernel]
+    squares = factor * (sizes - 2 * one @ other.T)
     differ = squares > _SAME  # the root has no slope at zero
     far = jnp.where(differ, jnp.sqrt(jnp.where(differ, squares, 1.0)), 0.0)
-    return amplitude**2 * (1 + far) * jnp.exp(-far)
+    return of(far, jnp.exp)[0]
 
 
 class ResidualProcess(AbstractCorrector):
