@@ -212,6 +212,7 @@ WAY_IN = (
 
 TRUST = (
     "learning/process",
+    "models/fitted_process",
     "models/process_card",
     "models/correctors/process",
     "cli/process",
@@ -296,6 +297,7 @@ ENGINEER = (
     "report/figures/recordings",
     "report/pages/inspection",
 )
+START = ("bench/start",)
 SCREENING = ("planning/screening", "bench/screening")
 ON_GPU = (
     "models/correctors/fused",
@@ -325,6 +327,7 @@ LATER = ADDED + modules_of(
     + ENGINEER
     + PAGE_OF_EVALUATION
     + SCREENING
+    + START
     + ON_GPU
     + ENSEMBLES
     + EXPECTED_COST
@@ -358,6 +361,7 @@ CONNECTIONS = {
     # Also durations, the report of all studies, and fewer training runs.
     "the whole paper": 262,
     "screening of pushes": 20,
+    "timing starts, processes loaded on demand": 7,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.
     "many machines": 245,
@@ -457,6 +461,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(PAGE_OF_EVALUATION))),
         150,
         150,
+    ),
+    "code lines of timing starts": (
+        lambda: sum(map(code_lines, modules_of(START))),
+        105,
+        105,
     ),
     "code lines of screening pushes": (
         lambda: sum(map(code_lines, modules_of(SCREENING))),

@@ -16,6 +16,7 @@ import pytest
 from jax.extend.core import ClosedJaxpr, Jaxpr
 
 from sainet.bench import CASES
+from sainet.bench import start as start_case
 from sainet.bench import training as training_case
 from sainet.bench.timing import ceiling_gflops, median_seconds
 from sainet.bench.training import (
@@ -199,6 +200,25 @@ def test_environments_reports_the_documented_figures():
 
 
 @pytest.mark.slow
+def test_start_reports_the_documented_figures(monkeypatch):
+    monkeypatch.setattr(start_case, "SCRIPT", "import sainet")
+    others = ("--model", "physics", "--port", "0")
+    monkeypatch.setattr(start_case, "PLAY", (*start_case.PLAY, *others))
+    figures = load_case("start")(1, pointers=2)
+    wanted = ("play_cold_s", "play_warm_s", "pointer_ms")
+    scripts = ("script_cold_s", "script_warm_s")
+    assert tuple(figures) == (*wanted, *scripts, "pointers", "runs", "reason")
+    assert all_finite(figures, but=("reason",))
+    assert figures["play_warm_s"] > figures["pointer_ms"] / 1000 > 0
+
+
+def test_a_page_that_does_not_start_is_no_figure(monkeypatch, tmp_path):
+    monkeypatch.setattr(start_case, "PLAY", ("-c", "print('no page')"))
+    with pytest.raises(BadInput, match="it ended at once"):
+        start_case._page(tmp_path, 1)
+
+
+@pytest.mark.slow
 def test_training_reports_the_documented_figures():
     figures = load_case("training")(2, pushes=3, steps=4, repeats=1)
     assert set(figures) == {
@@ -246,7 +266,7 @@ def test_the_ceiling_is_a_plausible_rate():
 
 
 def test_an_unknown_case_lists_the_available_cases():
-    every = "disks, engines, environments, planning, screening, training"
+    every = "disks, engines, environments, planning, screening, start, training"
     with pytest.raises(UnknownName, match=f"'trainin'.*{every}"):
         load_case("trainin")
 

@@ -11,7 +11,8 @@ from sainet.datasets.generate import generate
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.learning.choosing import choose_pushes
 from sainet.learning.process import fit_process
-from sainet.models.process_card import Fitted, ProcessSettings
+from sainet.models.fitted_process import Fitted
+from sainet.models.process_card import ProcessSettings
 
 NOISE = 0.1
 

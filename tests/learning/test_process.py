@@ -28,15 +28,9 @@ from sainet.learning.process_fit import fit_to, loss_and_slope
 from sainet.models.correctors import CONFIDENCE, Region
 from sainet.models.correctors.kernels import KERNELS
 from sainet.models.correctors.process import correlation
+from sainet.models.fitted_process import Fitted, corrector_of, rates_at
 from sainet.models.library import load_model
-from sainet.models.process_card import (
-    ARRAYS,
-    PROCESS,
-    Fitted,
-    ProcessSettings,
-    corrector_of,
-    rates_at,
-)
+from sainet.models.process_card import ARRAYS, PROCESS, ProcessSettings
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.controls import PathControls
 from sainet.scenes.geometry import rotate

@@ -1,6 +1,7 @@
 """Models by name: what ships, which engine goes inside, and what they are not for."""
 
 import re
+import subprocess
 import sys
 
 import pytest
@@ -83,3 +84,10 @@ def test_training_pushes_are_refused_as_test_pushes(folder):
         model.check_fits("robot", TIME_STEP, seed=4)
     for seed in (1, None):
         model.check_fits("robot", TIME_STEP, seed=seed)
+
+
+def test_loading_a_network_does_not_import_scipy():
+    code = "import sainet, sys; sainet.load('sain'); print(*sys.modules)"
+    found = subprocess.check_output([sys.executable, "-c", code], text=True).split()
+    assert "jax" in found
+    assert "scipy.linalg" not in found

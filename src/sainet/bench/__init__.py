@@ -15,5 +15,6 @@ CASES = {
     "environments": "sainet.bench.environments:bench_environments",
     "planning": "sainet.bench.planning:bench_planning",
     "screening": "sainet.bench.screening:bench_screening",
+    "start": "sainet.bench.start:bench_start",
     "training": "sainet.bench.training:bench_training",
 }

@@ -1,9 +1,9 @@
 """Time of a decision, and time of the same predictions in Bullet."""
 
-import os
 import subprocess
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from sainet.bench import Figures
-from sainet.bench.timing import check_runs
+from sainet.bench.timing import check_runs, with_cache
 from sainet.control.config import ControlConfig
 from sainet.control.trial import Trial, make_trial
 from sainet.engines import make_engine
@@ -114,14 +114,10 @@ def _starts(model: str) -> tuple[float, float]:
     """Return the times to the first decision (s), without and with compiled code."""
     code = _FIRST_DECISION.format(model=model, devices=jax.device_count())
     with TemporaryDirectory(prefix="sainet-bench-") as folder:
-        settings = {
-            "JAX_COMPILATION_CACHE_DIR": folder,
-            "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.5",
-        }
         times = []
         for _ in range(2):
             start = perf_counter()
             command = [sys.executable, "-c", code]
-            subprocess.run(command, check=True, env=os.environ | settings)
+            subprocess.run(command, check=True, env=with_cache(Path(folder)))
             times.append(perf_counter() - start)
     return times[0], times[1]

@@ -1,6 +1,8 @@
 """Timing of calls, and the rate of matrix products of the machine."""
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Any
@@ -9,6 +11,7 @@ import jax
 import numpy as np
 
 from sainet.runs.errors import BadSetting
+from sainet.runs.manifest import WORTH_KEEPING
 
 SIZE = 1024
 
@@ -40,6 +43,14 @@ def check_runs(runs: int) -> None:
     """Raise `BadSetting` if there are no measurements to take the median of."""
     if runs < 1:
         raise BadSetting("runs", runs, "at least 1")
+
+
+def with_cache(folder: Path) -> dict[str, str]:
+    """Return the environment of processes that keep compiled code in a folder."""
+    return os.environ | {
+        "JAX_COMPILATION_CACHE_DIR": str(folder),
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": str(WORTH_KEEPING),
+    }
 
 
 def ceiling_gflops(products: int = 5) -> float:

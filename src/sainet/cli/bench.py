@@ -63,7 +63,7 @@ class Bench:
 
     cases: Positional[tuple[str, ...]] = ()
     """Benchmark cases: training, engines, planning, screening, disks, environments,
-    and commands, which takes an hour. Default: all but commands."""
+    start, and commands, which takes an hour. Default: all but commands."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)

@@ -15,12 +15,8 @@ from scipy.linalg import cho_solve, cholesky
 
 from sainet.datasets.store import open_store
 from sainet.learning.process_ends import inputs_of
-from sainet.models.process_card import (
-    Fitted,
-    ProcessCard,
-    covariance_between,
-    read_process,
-)
+from sainet.models.fitted_process import Fitted, covariance_between, read_process
+from sainet.models.process_card import ProcessCard
 from sainet.runs.errors import BadInput
 
 GRID = 1024  # possible pushes, drawn at random

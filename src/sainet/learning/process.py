@@ -20,15 +20,14 @@ from sainet.learning.process_fit import fit_to
 from sainet.models.checkpoint import save_arrays
 from sainet.models.correctors import CONFIDENCE
 from sainet.models.correctors.process import BODIES, RESIDUALS
+from sainet.models.fitted_process import Fitted, rates_at
 from sainet.models.identity import ModelId
 from sainet.models.process_card import (
     ARRAYS,
     MOST,
     PROCESS,
-    Fitted,
     ProcessCard,
     ProcessSettings,
-    rates_at,
 )
 from sainet.runs.digests import digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document

@@ -12,7 +12,8 @@ from scipy.optimize import minimize
 from sainet.learning.process_ends import Ends
 from sainet.models.correctors.kernels import KERNELS, KernelName
 from sainet.models.correctors.process import RESIDUALS
-from sainet.models.process_card import Fitted, ProcessSettings, squared_distances
+from sainet.models.fitted_process import Fitted, squared_distances
+from sainet.models.process_card import ProcessSettings
 from sainet.runs.interrupts import raise_if_interrupted
 
 _ENOUGH = 1000  # pushes for amplitude, length scales and noise; the rest conditions

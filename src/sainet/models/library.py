@@ -37,7 +37,7 @@ from sainet.models.ensemble import Ensemble, stacked
 from sainet.models.ensemble_card import is_ensemble, load_ensemble, member
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
-from sainet.models.process_card import ProcessCard, is_process, load_process
+from sainet.models.process_card import ProcessCard, is_process
 from sainet.models.wrappers import Restarted, with_camera
 from sainet.runs import errors
 from sainet.runs.documents import content_hash, read_file
@@ -110,9 +110,12 @@ def load_model(
     if is_ensemble(folder):
         network, card, found = load_ensemble(folder)
         calibration = found.calibration
+    elif is_process(folder):
+        from sainet.models.fitted_process import load_process  # slow: scipy.linalg
+
+        network, card = load_process(folder)
     else:
-        load = load_process if is_process(folder) else load_network
-        network, card = load(folder)
+        network, card = load_network(folder)
     dynamics: AbstractDynamics = LearnedDynamics(network)
     internal = built = None
     if card.identity.simulator is not None:

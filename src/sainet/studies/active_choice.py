@@ -29,8 +29,9 @@ from sainet.learning.choosing import choose_pushes
 from sainet.learning.process_ends import Ends, ends_of
 from sainet.learning.process_fit import fit_to
 from sainet.models.correctors.process import RESIDUALS
+from sainet.models.fitted_process import rates_at
 from sainet.models.identity import ModelId
-from sainet.models.process_card import ProcessSettings, rates_at
+from sainet.models.process_card import ProcessSettings
 from sainet.runs.errors import BadStore
 from sainet.studies import Scale
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
