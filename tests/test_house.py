@@ -273,12 +273,13 @@ WHOLE_PAPER = (
     "studies/durations",
     "studies/effort",
     "studies/feedforward",
-    "studies/letter",
+    "studies/letter.py",
     "studies/properties",
     "studies/published_physics",
     "studies/reduced_setup",
     "studies/whole_report",
 )
+UNITS = ("studies/letter_units",)
 MANY_MACHINES = (
     "evaluation/parts",
     "runs/executors",
@@ -334,6 +335,7 @@ LATER = ADDED + modules_of(
     + MARGINS
     + ANY_NUMBER
     + WHOLE_PAPER
+    + UNITS
     + MANY_MACHINES
 )
 REBUILT = [path for path in MODULES if path not in LATER]
@@ -360,6 +362,7 @@ CONNECTIONS = {
     "episodes of several models side by side": 50,
     # Also durations, the report of all studies, and fewer training runs.
     "the whole paper": 262,
+    "the unit of the loss, claims of several studies on a page": 10,
     "screening of pushes": 20,
     "timing starts, processes loaded on demand": 7,
     # Shares of datasets, trials and evaluations, the options of five commands, and
@@ -446,6 +449,11 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
         1_215,
         1_215,
+    ),
+    "code lines of the unit of the loss": (
+        lambda: sum(map(code_lines, modules_of(UNITS))),
+        20,
+        20,
     ),
     "code lines of many machines": (
         lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),

@@ -10,6 +10,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.learning.recipes import PAPER
 from sainet.studies import letter, load_study
+from sainet.studies.letter_units import MILLIMETRES
 from sainet.studies.paper_setup import Sizes
 from sainet.studies.published_physics import NEAR, STUDY, closest, furthest, grid
 from support import require
@@ -35,6 +36,13 @@ def test_each_stage_adds_choices_until_the_recipe_is_the_usual_one():
     stages = (*letter.CHAIN, letter.LESS_L2)
     slugs = [network.slug for stage in stages for network in stage.networks()]
     assert len(set(slugs)) == 2 * len(stages)
+
+
+def test_millimetres_instead_of_metres_change_only_l2():
+    metres, millimetres = map(settings_of, (letter.LETTER, MILLIMETRES))
+    assert metres | {"l2": 1e-9} == millimetres
+    # Per pose, 1e-3 w^2 + (1000 e)^2 is (1e-9 w^2 + e^2) times a million.
+    assert millimetres["l2"] == pytest.approx(metres["l2"] / 1000**2)
 
 
 @pytest.mark.slow

@@ -175,3 +175,11 @@ def test_episodes_are_kept_by_their_goals_in_the_order_of_models(tmp_path):
     (tmp_path / "results/episodes/easy-3-disks/sain.json.xz").write_bytes(b"cut")
     with pytest.raises(BadInput, match=r"sain.json.xz: no episode \("):
         Evidence(tmp_path).episodes()
+
+
+def test_every_claim_with_evidence_is_among_the_findings():
+    found = (REPOSITORY / "docs/results/findings.md").read_text("utf-8")
+    for name in STUDIES:
+        if (REPOSITORY / "results" / f"{name}.nc.xz").is_file():
+            for claim in load_study(name).claims:
+                assert f"| {claim.text} |" in found, name

@@ -37,6 +37,7 @@ Variant = Literal[
     "loss-in-metres",
     "large-l2",
     "small-l2",
+    "millimetres",
     "chosen",
 ]
 
@@ -54,6 +55,7 @@ _VARIANTS = {
     "loss-in-metres": "loss in metres",
     "large-l2": "large l2",
     "small-l2": "small l2",
+    "millimetres": "loss in millimetres",
     "three-disks": "3 disks",
     "fixed-properties": "fixed properties",
     "nominal": "nominal inputs",

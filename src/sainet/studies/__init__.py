@@ -35,6 +35,7 @@ STUDIES = {
     "gaps": "sainet.studies.any_number:GAPS",
     "published-physics": "sainet.studies.published_physics:STUDY",
     "letter": "sainet.studies.letter:CHAIN_STUDY",
+    "letter-millimetres": "sainet.studies.letter_units:STUDY",
     "letter-noise": "sainet.studies.letter:NOISE_STUDY",
     "letter-weak-damper": "sainet.studies.letter:WEAK_DAMPER_STUDY",
     "recurrent-or-not": "sainet.studies.variants:RECURRENT_OR_NOT",

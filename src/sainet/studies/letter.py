@@ -154,7 +154,7 @@ def _weak_damper(scope: Scope) -> Plan:
     return Plan(world.compare((LETTER, USUAL), scope.seeds(TRAININGS)))
 
 
-def _sain_errs_less(stages: Sequence[Stage], condition: str = "") -> tuple[Claim, ...]:
+def sain_errs_less(stages: Sequence[Stage], condition: str = "") -> tuple[Claim, ...]:
     """Return the paper's thesis for each stage: SAIN errs less than IN."""
     where = f", {condition}" if condition else ""
     return tuple(
@@ -170,7 +170,7 @@ def _sain_errs_less(stages: Sequence[Stage], condition: str = "") -> tuple[Claim
 CHAIN_STUDY = Study(
     question="Which of our choices close the gap between IN and SAIN?",
     plan=_chain,
-    claims=_sain_errs_less((*CHAIN, LESS_L2)),
+    claims=sain_errs_less((*CHAIN, LESS_L2)),
     published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
 )
 NOISE_STUDY = Study(
@@ -179,12 +179,12 @@ NOISE_STUDY = Study(
     claims=tuple(
         claim
         for level, stage in product(get_args(NoiseLevel), (LETTER, USUAL))
-        for claim in _sain_errs_less((stage,), f"{level} noise")
+        for claim in sain_errs_less((stage,), f"{level} noise")
     ),
 )
 WEAK_DAMPER_STUDY = Study(
     question="Do networks have the published errors where Physics has?",
     plan=_weak_damper,
-    claims=_sain_errs_less((LETTER, USUAL)),
+    claims=sain_errs_less((LETTER, USUAL)),
     published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
 )

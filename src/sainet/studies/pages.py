@@ -8,6 +8,7 @@ or the record of an episode that is drawn. Prose stands in the templates in
 ``docs/templates``, which set their titles; numbers come from measurements.
 """
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -173,21 +174,20 @@ def conclusions(evidence: Evidence, study: str | None = None) -> str:
     return table(CLAIM_HEADINGS, rows_of_claims(shown), align=":--")
 
 
-def findings(evidence: Evidence, titles: Mapping[str, str]) -> str:
+def findings(evidence: Evidence, pages: Mapping[str, str]) -> str:
     """Return every claim with its verdict and the page of its study, as a table.
 
     Args:
         evidence: of the studies.
-        titles: of pages, by the names of their templates.
+        pages: links to the pages of studies.
     """
     rows: list[tuple[str, ...]] = []
-    for name in STUDIES:
-        claims = load_study(name).claims if name in titles else ()
+    for name in filter(pages.__contains__, STUDIES):
+        claims = load_study(name).claims
         summary = evidence.summary(name) if claims else Summary(models=())
-        page = f"[{titles[name]}]({name}.md)" if claims else ""
         for each in rule_on(claims, summary):
             p = "" if each.p is None else f"{each.p:.2g}"
-            rows.append((each.claim.text, f"**{each.status}**", p, page))
+            rows.append((each.claim.text, f"**{each.status}**", p, pages[name]))
     return table(("claim", "verdict", "p", "page"), rows, align=":--")
 
 
@@ -212,7 +212,12 @@ def rendered(root: Path) -> dict[Path, str]:
     block = pages.pop(_README)
     for name in _LAST:
         titles = {name: page.title for name, page in pages.items()}
-        found = findings(evidence, {Path(k).stem: v for k, v in titles.items()})
+        links = {
+            study: f"[{title}]({page})"
+            for page, title in titles.items()
+            for study in (Path(page).stem, *_shown(templates / f"{page}.j2"))
+        }
+        found = findings(evidence, links)
         transcribed = [k for k, page in pages.items() if TRANSCRIBED in page.text]
         template = environment.get_template(f"{name}.j2")
         pages[name] = _page(
@@ -222,6 +227,11 @@ def rendered(root: Path) -> dict[Path, str]:
     return {root / PAGES / name: page.text for name, page in pages.items()} | {
         readme: with_block(readme.read_text("utf-8"), block.text)
     }
+
+
+def _shown(template: Path) -> list[str]:
+    """Return the studies whose claims a page shows."""
+    return re.findall(r'\bclaims\("([^"]+)"\)', template.read_text("utf-8"))
 
 
 def _page(template: jinja2.Template, **values: object) -> Page:
