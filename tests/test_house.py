@@ -348,7 +348,7 @@ CONNECTIONS = {
     "units and bad pushes of tables": 35,
     "expected costs in planners": 40,
     "cross-validation": 10,
-    "choice of inputs and kernels, ensembles in cross-validation": 13,
+    "choice of inputs and kernels, ensembles in cross-validation": 14,
     "ensembles": 62,
     "provenance of identified engines": 10,
     "wrong arguments, settings without effect, full disks": 89,

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
@@ -83,19 +84,19 @@ def _page(folder: Path, pointers: int) -> dict[str, float]:
     for cache in ("cold", "warm"):
         start = time.perf_counter()
         with _served(folder) as page:
-            _await(page, lambda answer: bool(answer.get("can_predict")))
-            _aim(page, 0)
+            page.wait(lambda: page.can("can_predict"))
+            page.aim(0)
             found[f"play_{cache}_s"] = time.perf_counter() - start
             if cache == "warm":
-                _await(page, lambda answer: bool(answer.get("is_ready")))
-                times = [_aim(page, number) for number in range(1, pointers + 1)]
+                page.wait(lambda: page.can("is_ready"))
+                times = [page.aim(number) for number in range(1, pointers + 1)]
                 found["pointer_ms"] = 1000 * median(times)
     return found
 
 
 @contextmanager
-def _served(folder: Path) -> "Iterator[ClientConnection]":
-    """Run `sainet play`, and yield a connection to it.
+def _served(folder: Path) -> Iterator["_Page"]:
+    """Run `sainet play`, and yield its page.
 
     Raises:
         BadInput: the command ended without a page.
@@ -118,25 +119,34 @@ def _served(folder: Path) -> "Iterator[ClientConnection]":
                 raise BadInput("sainet play: it ended at once; is its port in use?")
             host = line.split("http://")[1].split()[0].rstrip("/")
             own = Origin(f"http://{host}")
-            with connect(f"ws://{host}/live", origin=own, proxy=None) as page:
-                yield page
+            with connect(f"ws://{host}/live", origin=own, proxy=None) as socket:
+                yield _Page(socket)
         finally:
             server.terminate()
 
 
-def _aim(page: "ClientConnection", number: int) -> float:
-    """Point at a push, and return the seconds until its predictions arrive."""
-    angle = 40 * (number * _GOLDEN % 1) - 20
-    aim = {"type": "aim", "contact_angle_deg": angle, "direction_deg": angle / 2}
-    start = time.perf_counter()
-    page.send(json.dumps(aim | {"number": number}))
-    _await(page, lambda answer: answer.get("number") == number)
-    return time.perf_counter() - start
+@dataclass
+class _Page:
+    """A client of the page, and the newest message of each type that it received."""
 
+    socket: "ClientConnection"
+    newest: dict[str, Mapping[str, object]] = field(default_factory=dict)
 
-def _await(
-    page: "ClientConnection", is_wanted: Callable[[Mapping[str, object]], bool]
-) -> None:
-    """Receive messages until one is wanted."""
-    while not is_wanted(json.loads(page.recv(timeout=_PATIENCE))):
-        pass
+    def can(self, what: str) -> bool:
+        """Return whether the newest status says that the page can do something."""
+        return bool(self.newest.get("status", {}).get(what))
+
+    def wait(self, is_done: Callable[[], bool]) -> None:
+        """Receive messages until something is so; earlier messages count."""
+        while not is_done():
+            message = json.loads(self.socket.recv(timeout=_PATIENCE))
+            self.newest[message["type"]] = message
+
+    def aim(self, number: int) -> float:
+        """Point at a push, and return the seconds until its predictions arrive."""
+        angle = 40 * (number * _GOLDEN % 1) - 20
+        aim = {"type": "aim", "contact_angle_deg": angle, "direction_deg": angle / 2}
+        start = time.perf_counter()
+        self.socket.send(json.dumps(aim | {"number": number}))
+        self.wait(lambda: self.newest.get("ghosts", {}).get("number") == number)
+        return time.perf_counter() - start

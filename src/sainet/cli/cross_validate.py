@@ -12,7 +12,7 @@ from sainet.datasets import Scheme
 from sainet.report import WRITERS
 from sainet.runs.errors import require, require_one_of
 from sainet.runs.executors import Machines
-from sainet.studies import USUAL_CANDIDATES, CandidateName
+from sainet.studies import MEMBERS, USUAL_CANDIDATES, CandidateName
 
 if TYPE_CHECKING:
     from sainet.models.identity import ModelId
@@ -131,5 +131,5 @@ def _command(model: "ModelId", data: str, ending: str) -> str:
     tune = f"--features {model.features} {data} --out runs/model{ending}"
     if model.kind == "gp":
         return f"sainet tune gp {tune}" + " --choose" * (model.variant == "chosen")
-    tune += " --members 5" * (model.variant == "ensemble")
+    tune += f" --members {MEMBERS}" * (model.variant == "ensemble")
     return f"{identify} && sainet tune sain {tune} --engine {engine}"

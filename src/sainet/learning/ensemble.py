@@ -80,9 +80,8 @@ def fit_ensemble(
     objective = recipe.objective.for_pushes(len(rest))
     settings = msgspec.to_builtins(recipe.changed(l2=objective.l2).settings())
     config = {"command": "train", "model": model, "members": members}
-    is_named = isinstance(assumed_engine, str)
-    engine = assumed_engine if is_named else msgspec.to_builtins(assumed_engine)
-    config |= {"data": store.content, "engine": engine, **settings}
+    config |= {"data": store.content, "engine": msgspec.to_builtins(assumed_engine)}
+    config |= settings
     folder = open_run(out, config, finished_by=ENSEMBLE)
     training = store.take(np.sort(rest))
 

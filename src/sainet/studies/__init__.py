@@ -24,6 +24,7 @@ CandidateName = Literal[
 USUAL_CANDIDATES: tuple[CandidateName, ...] = (
     *("sain", "gp-side", "sain-place", "gp-place"),
 )
+MEMBERS = 5  # of an ensemble among them
 
 
 STUDIES = {

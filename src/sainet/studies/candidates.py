@@ -18,10 +18,8 @@ from sainet.learning.recipes import RESIDUAL, Recipe
 from sainet.models.identity import Features, ModelId, ProcessFeatures
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.errors import unknown_name
-from sainet.studies import CandidateName
+from sainet.studies import MEMBERS, CandidateName
 from sainet.studies.recorded_models import IDENTIFIED
-
-MEMBERS = 5  # of an ensemble
 
 
 @dataclass(frozen=True)
