@@ -144,6 +144,19 @@ def test_foreign_folders_conflict_and_stay_unchanged(tmp_path):
         open_here(tmp_path / "thesis.tex")
 
 
+def test_a_shard_may_begin_while_another_looks_at_the_folder(tmp_path, monkeypatch):
+    listed = Path.iterdir
+
+    def another_begins(path):
+        monkeypatch.undo()
+        open_run(tmp_path, {"seed": 1}, finished_by="", shared=True)
+        return listed(path)
+
+    monkeypatch.setattr(Path, "iterdir", another_begins)
+    folder = open_run(tmp_path, {"seed": 1}, finished_by="", shared=True)
+    assert folder.path == tmp_path
+
+
 def test_settings_that_cannot_be_read_conflict(tmp_path):
     (tmp_path / "config.json").write_text("{")
     with pytest.raises(RunConflict, match="config.json"):

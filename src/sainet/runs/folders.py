@@ -150,14 +150,15 @@ def _check_free(path: Path, wanted: dict[str, Any]) -> None:
     """Raise `RunConflict` unless a folder is free or has the same settings."""
     if path.exists() and not path.is_dir():
         raise RunConflict(f"{path}: is a file; choose a folder as `out`.")
+    # Listed before the settings are looked for: another shard may be writing them.
+    entries = list(path.iterdir()) if path.is_dir() else []
     if (path / MANIFEST).exists():
-        remedy = remake(path)
         documents.read_document(
-            path / MANIFEST, Manifest, error=RunConflict, remedy=remedy
+            path / MANIFEST, Manifest, error=RunConflict, remedy=remake(path)
         )
     if (path / CONFIG).exists():
         _check_same(path, documents.read_json(path / CONFIG, RunConflict), wanted)
-    elif path.is_dir() and not all(map(_may_be_left, path.iterdir())):
+    elif not all(map(_may_be_left, entries)):
         raise RunConflict(f"{path}: not a sainet run folder; choose an empty folder.")
 
 
