@@ -323,6 +323,47 @@ def test_many_environments_equal_single_ones(disks):
         assert [values[index] for values in found[3][1:4]] == [0, False, False]
 
 
+def test_trials_may_begin_in_the_step_that_ends_the_one_before():
+    options = {"pushes": 2, "noise_level": "none"}
+    later = make_many(3, **options)
+    at_once = make_many(3, autoreset_mode="SameStep", **options)
+    mode = gymnasium.vector.AutoresetMode.SAME_STEP
+    assert at_once.metadata["autoreset_mode"] == mode
+    assert_same(later.reset(seed=7)[0], at_once.reset(seed=7)[0])
+    first, second, ignored = np.random.default_rng(0).integers(72, size=(3, 3))
+    last, *scalars, infos = later.step(first)
+    found, *same, final = at_once.step(first)
+    assert_same(last, found)
+    np.testing.assert_array_equal(scalars, same)
+    assert "final_obs" not in final
+    last, *scalars, infos = later.step(second)
+    began, *same, final = at_once.step(second)
+    np.testing.assert_array_equal(scalars, same)
+    assert final["_final_obs"].all() and final["_final_info"].all()
+    for index in range(3):
+        assert_same(row(last, index), final["final_obs"][index])
+    for name, values in infos.items():
+        np.testing.assert_array_equal(final["final_info"][name], values)
+    fresh, *_, infos = later.step(ignored)
+    assert_same(fresh, began)
+    np.testing.assert_array_equal(infos["distance"], final["distance"])
+    # An episode that goes on has no end to show.
+    at_once.reset(seed=7)
+    at_once._pushes[1] = 1
+    *_, final = at_once.step(first)
+    assert final["_final_obs"].tolist() == [False, True, False]
+    assert [each is None for each in final["final_obs"]] == [True, False, True]
+    assert final["final_info"]["_distance"].tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    "mode", ["Disabled", "", gymnasium.vector.AutoresetMode.DISABLED]
+)
+def test_other_autoreset_modes_are_refused(mode):
+    with pytest.raises(BadSetting, match="`autoreset_mode` is .* one of NextStep"):
+        make_many(2, autoreset_mode=mode)
+
+
 def row(observation, index):
     return {name: values[index] for name, values in observation.items()}
 

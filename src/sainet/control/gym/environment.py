@@ -1,7 +1,7 @@
 """The environment `sainet/PushDisks-v0`: one trial of control after another."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,22 +14,22 @@ from sainet.control.gym.extra import gymnasium
 from sainet.control.gym.raster import Picture
 from sainet.control.gym.running import RunningTrial
 from sainet.control.gym.spaces import (
+    GoalRewards,
     distances,
     goal_on_table,
     is_on_table,
     observation_space,
-    rewards,
 )
 from sainet.control.gym.task import Observation, PushDisksTask
+from sainet.control.record import poses_of
 from sainet.control.trial import make_trial
-from sainet.runs.errors import BadSetting, require_one_of
-from sainet.scenes.quantities import LARGEST_COUNT, require_count
+from sainet.runs.errors import require_one_of
+from sainet.scenes.quantities import require_count
 
 _RENDER_MODES = ("rgb_array",)
-_OPTIONS = ("goal", "trial")
 
 
-class PushDisks(gymnasium.Env[Observation, Action]):
+class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
     """Push disk 1 until the target disk is at its goal.
 
     A goal environment: `compute_reward` returns the reward for any goal. Episodes after
@@ -42,10 +42,7 @@ class PushDisks(gymnasium.Env[Observation, Action]):
     ``info["trouble"]`` the trouble of the last push, empty for most pushes.
     """
 
-    metadata = {
-        "render_modes": list(_RENDER_MODES),
-        "render_fps": 4,
-    }
+    metadata = {"render_modes": list(_RENDER_MODES), "render_fps": 4}
 
     def __init__(self, *, render_mode: str | None = None, **options: Any) -> None:  # noqa: ANN401
         """Make the environment.
@@ -87,7 +84,7 @@ class PushDisks(gymnasium.Env[Observation, Action]):
         """
         options = options or {}
         for name in options:
-            require_one_of("options", name, _OPTIONS)
+            require_one_of("options", name, ("goal", "trial"))
         goal = goal_on_table(options["goal"]) if "goal" in options else None
         wanted = options.get("trial")
         index = None if wanted is None else _trial(wanted)
@@ -113,7 +110,7 @@ class PushDisks(gymnasium.Env[Observation, Action]):
         if running.is_over:
             raise gymnasium.error.ResetNeeded("The episode is over: call `reset`.")
         trouble = running.push(self.task.actions.pushes(action))
-        pose = running.observe()
+        pose = poses_of(running.trial.robot.observe())
         lost = not is_on_table(pose)
         if lost:  # the poses measured before are kept
             trouble = trouble or "a disk left the table"
@@ -125,23 +122,8 @@ class PushDisks(gymnasium.Env[Observation, Action]):
         spent = running.pushes >= self.config.pushes
         truncated = not terminated and (spent or running.is_stuck or lost)
         running.is_over = terminated or truncated
-        reward = float(self._reward(away))
+        reward = float(self.rewards(away))
         return observation, reward, terminated, truncated, running.info(trouble)
-
-    def compute_reward(
-        self,
-        achieved_goal: Float[np.ndarray, "*env 2"],
-        desired_goal: Float[np.ndarray, "*env 2"],
-        info: object,
-    ) -> Float[np.ndarray, "*env"]:
-        """Return the rewards of positions of the target disk, for any goals.
-
-        Args:
-            achieved_goal: measured positions of the target disk (m).
-            desired_goal: goals (m).
-            info: has no effect.
-        """
-        return self._reward(distances(achieved_goal, desired_goal))
 
     def render(self) -> Picture | None:
         """Return a picture of the true poses; None without a `render_mode`.
@@ -161,9 +143,6 @@ class PushDisks(gymnasium.Env[Observation, Action]):
             trial = trial._replace(task=task)
         self._running, self._next = RunningTrial.begin(trial), index + 1
 
-    def _reward(self, distance: Float[np.ndarray, "*env"]) -> Float[np.ndarray, "*env"]:
-        return rewards(distance, tolerance=self.task.tolerance, kind=self.config.reward)
-
     def _current(self) -> RunningTrial:
         if self._running is None:
             raise gymnasium.error.ResetNeeded("Call `reset` before this.")
@@ -176,7 +155,5 @@ def _trial(index: object) -> int:
     Raises:
         BadSetting: it is no whole number from 0.
     """
-    if not isinstance(index, int | np.integer):
-        raise BadSetting("trial", index, "a whole number, at least 0")
-    require_count("trial", int(index), low=0, high=LARGEST_COUNT)
-    return int(index)
+    require_count("trial", index, low=0)
+    return int(cast("int", index))

@@ -53,10 +53,6 @@ class RunningTrial:
         self.troubles = self.troubles + 1 if trouble else 0
         return trouble
 
-    def observe(self) -> Float[np.ndarray, "disk 3"]:
-        """Return the measured poses (m, m, rad)."""
-        return poses_of(self.trial.robot.observe())
-
     def info(self, trouble: str = "") -> dict[str, object]:
         """Return how far the true pose is from the goal, and the trouble of a push."""
         task, robot = self.trial.task, self.trial.robot

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sainet.control.gym.config import RewardKind
+from sainet.control.gym.config import PushDisksConfig
 from sainet.control.gym.extra import gymnasium
 from sainet.control.gym.task import PushDisksTask
 from sainet.runs.errors import BadInput, BadSetting, shown
@@ -61,20 +61,33 @@ def distances(
     return np.asarray(np.sqrt(np.sum(away * away, axis=-1)))
 
 
-def rewards(
-    distance: Float[np.ndarray, "*env"], *, tolerance: float, kind: RewardKind
-) -> Float[np.ndarray, "*env"]:
-    """Return the rewards at distances from the goal.
+class GoalRewards:
+    """Rewards of an environment, for any goals."""
 
-    Args:
-        distance: measured, m.
-        tolerance: distance that counts as reached, m.
-        kind: sparse, 0 where the goal is reached and -1 elsewhere, or dense, minus the
-            distance.
-    """
-    if kind == "dense":
-        return np.asarray(-distance)
-    return np.where(distance <= np.float32(tolerance), 0.0, -1.0).astype(np.float32)
+    config: PushDisksConfig
+    task: PushDisksTask
+
+    def compute_reward(
+        self,
+        achieved_goal: Float[np.ndarray, "*env 2"],
+        desired_goal: Float[np.ndarray, "*env 2"],
+        info: object,
+    ) -> Float[np.ndarray, "*env"]:
+        """Return the rewards of positions of the target disk, for any goals.
+
+        Args:
+            achieved_goal: measured positions of the target disk (m).
+            desired_goal: goals (m).
+            info: has no effect.
+        """
+        return self.rewards(distances(achieved_goal, desired_goal))
+
+    def rewards(self, distance: Float[np.ndarray, "*env"]) -> Float[np.ndarray, "*env"]:
+        """Return the rewards at measured distances from the goal (m)."""
+        if self.config.reward == "dense":
+            return np.asarray(-distance)
+        is_there = distance <= np.float32(self.task.tolerance)
+        return np.where(is_there, 0.0, -1.0).astype(np.float32)
 
 
 def is_on_table(

@@ -11,43 +11,49 @@ from sainet.control.gym.actions import ACTIONS
 from sainet.control.gym.config import PushDisksConfig
 from sainet.control.gym.extra import gymnasium
 from sainet.control.gym.spaces import (
+    GoalRewards,
     distances,
     is_on_table,
     observation_space,
-    rewards,
 )
 from sainet.control.gym.tables import Tables
 from sainet.control.gym.task import Observation, PushDisksTask, observation_of
 from sainet.control.trial import make_trial
-from sainet.runs.errors import BadInput, BadSetting, require
+from sainet.runs.errors import BadInput, BadSetting, require, require_one_of
 from sainet.scenes.quantities import LARGEST_COUNT, require_count
 
+_Mode = gymnasium.vector.AutoresetMode
 _MOST = 1_000_000  # environments
 _SINGLE = "if `vectorization_mode` is not 'sync' or 'async'"
 _Each = Bool[np.ndarray, " env"]
-_Infos = dict[str, np.ndarray]
+_Infos = dict[str, object]
 
 
-class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.ndarray]):
+class PushDisksVector(
+    GoalRewards, gymnasium.vector.VectorEnv[Observation, np.ndarray, np.ndarray]
+):
     """Environments with planar worlds, all pushed in one compiled call.
 
     Seeds, goals, starts and frictions equal those of `PushDisks`: environment i has
     the trials of seed ``seed + i``. The noise of all environments comes from one
     generator, so that only equal seeds and equal actions have equal results. An
     environment whose episode is over begins its next trial at the next step, whose
-    action has no effect (autoreset mode NEXT_STEP).
+    action has no effect (autoreset mode NEXT_STEP), or in the same step, whose infos
+    have the last observation and infos of that episode (SAME_STEP).
     """
 
-    metadata = {
-        "render_modes": [],
-        "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP,
-    }
-
-    def __init__(self, num_envs: int = 1, **options: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        autoreset_mode: str | _Mode = _Mode.NEXT_STEP,
+        **options: Any,  # noqa: ANN401
+    ) -> None:
         """Make the environments.
 
         Args:
             num_envs: number of environments.
+            autoreset_mode: NextStep or SameStep, or the member of Gymnasium's enum.
             options: fields of `PushDisksConfig`; the world has to be planar.
 
         Raises:
@@ -57,6 +63,9 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
         require_count("num_envs", num_envs, high=_MOST)
         mode = options.pop("render_mode", None)
         require(mode is None, "render_mode", f"None {_SINGLE}", mode)
+        name = str(getattr(autoreset_mode, "value", autoreset_mode))
+        require_one_of("autoreset_mode", name, ("NextStep", "SameStep"))
+        self.metadata = {"render_modes": [], "autoreset_mode": _Mode(name)}
         self.config = PushDisksConfig.of(**options)
         if self.config.world != "planar":
             raise BadSetting("world", self.config.world, f"planar {_SINGLE}")
@@ -129,24 +138,13 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
         ended |= self._troubles >= MOST_TROUBLES
         truncated = ended & ~terminated & ~again
         self._is_over = terminated | truncated
-        reward = np.where(again, 0, self._reward(away))
-        return self._observation, reward, terminated, truncated, self._infos()
-
-    def compute_reward(
-        self,
-        achieved_goal: Float[np.ndarray, "*env 2"],
-        desired_goal: Float[np.ndarray, "*env 2"],
-        info: object,
-    ) -> Float[np.ndarray, "*env"]:
-        """Return the rewards of positions of the target disk, as `PushDisks` does."""
-        return self._reward(distances(achieved_goal, desired_goal))
+        reward = np.where(again, 0, self.rewards(away))
+        final = self._finish()
+        return self._observation, reward, terminated, truncated, self._infos() | final
 
     @property
     def _observation(self) -> Observation:
         return observation_of(self._pose, self._tables.goal, self.task.target)
-
-    def _reward(self, distance: Float[np.ndarray, "*env"]) -> Float[np.ndarray, "*env"]:
-        return rewards(distance, tolerance=self.task.tolerance, kind=self.config.reward)
 
     def _begin(self, which: _Each) -> None:
         """Begin the next trial of some environments."""
@@ -157,17 +155,29 @@ class PushDisksVector(gymnasium.vector.VectorEnv[Observation, np.ndarray, np.nda
         self._pushes[rows] = self._troubles[rows] = 0
         self._is_over = self._is_over & ~which
 
-    def _infos(self) -> _Infos:
+    def _finish(self) -> _Infos:
+        """Begin trials in the mode SAME_STEP; return how those before them ended."""
+        over = self._is_over
+        if self.metadata["autoreset_mode"] is _Mode.NEXT_STEP or not over.any():
+            return {}
+        each = gymnasium.vector.utils.iterate(self.observation_space, self._observation)
+        seen = np.full(self.num_envs, None, object)
+        seen[over] = np.fromiter(each, object)[over]
+        final = {"final_obs": seen, "final_info": self._infos(over)}
+        self._begin(over)
+        return _masked(final, over)
+
+    def _infos(self, which: _Each | None = None) -> _Infos:
         """Return success and distance of the true poses, each with its mask."""
         place = self._tables.pose[:, self.task.target, :2]
         away = distances(place, self._tables.goal)
-        every = np.ones(self.num_envs, bool)
-        return {
-            "is_success": away <= self.task.success_radius,
-            "_is_success": every,
-            "distance": away,
-            "_distance": every.copy(),
-        }
+        found = {"is_success": away <= self.task.success_radius, "distance": away}
+        return _masked(found, np.ones(len(away), bool) if which is None else which)
+
+
+def _masked(found: Mapping[str, object], which: _Each) -> _Infos:
+    """Return infos, each with the mask of the environments that it is about."""
+    return {**found, **{f"_{name}": which.copy() for name in found}}
 
 
 def _seeds(seed: int | np.integer | Sequence[int], count: int) -> np.ndarray:
