@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sainet.models.blocks import RelativePose
 from sainet.models.integrators import RelaxingResidual
 from sainet.scenes.controls import PathControls
 
@@ -177,28 +178,35 @@ def layers(net, x) -> np.ndarray:
     return x
 
 
-def bounded(x, mean, deviation) -> np.ndarray:
-    return BOUND * np.tanh((x - double(mean)) / double(deviation) / BOUND)
+def standardised(x, mean, deviation) -> np.ndarray:
+    return (x - double(mean)) / double(deviation)
+
+
+def bounded(x) -> np.ndarray:
+    return BOUND * np.tanh(x / BOUND)
 
 
 def accelerations(network, local, motion, simulated_step, step: int) -> np.ndarray:
     scales, bodies = network.scales, range(len(motion))
-    scaled = network.features.are_standardised
+    features = network.features
+    poses = RelativePose() in features.blocks
     pose_step = None if simulated_step is None else simulated_step[:, :3]
     rate_step = None if simulated_step is None else simulated_step[:, 3:]
     found = []
     for i in bodies:
         effect = np.zeros(16)
         for j in acting_on(local, motion, i):
-            seen = pair_inputs(local, motion, rate_step, i, j, poses=not scaled)
-            if scaled:
-                seen = bounded(seen, scales.pair_mean, scales.pair_deviation)
+            seen = pair_inputs(local, motion, rate_step, i, j, poses=poses)
+            if not features.has_si_units:
+                seen = standardised(seen, scales.pair_mean, scales.pair_deviation)
+                seen = bounded(seen) if features.has_bounds else seen
             effect += layers(network.rel, seen)
         seen = body_inputs(local, motion, pose_step, step, i)
-        if network.features.has_place:
+        if features.has_place:
             seen = np.concatenate([seen, place_inputs(local, motion, i)])
-        if scaled:
-            seen = bounded(seen, scales.body_mean, scales.body_deviation)
+        if not features.has_si_units:
+            seen = standardised(seen, scales.body_mean, scales.body_deviation)
+            seen = bounded(seen) if features.has_bounds else seen
         out = layers(network.dyn, np.concatenate([seen, effect]))
         found.append(out * double(scales.acceleration))
     return np.array(found)

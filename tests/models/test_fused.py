@@ -30,6 +30,7 @@ FORMS = (
     ("robot", True, "paper"),
     ("robot", False, "paper"),
     ("direct-force", True, "letter"),
+    ("robot", True, "unbounded"),
 )
 interpreted = partial(unroll_fused, interpret=True)
 

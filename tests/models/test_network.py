@@ -118,7 +118,9 @@ def test_an_untrained_additive_network_equals_the_engine(kind):
     np.testing.assert_allclose(found[..., 3:], wanted[..., 3:], atol=2e-4)
 
 
-@pytest.mark.parametrize("name", ["place", "letter", "letter-push-frame"])
+@pytest.mark.parametrize(
+    "name", ["place", "letter", "letter-push-frame", "letter-motion", "unbounded"]
+)
 @every_kind
 @every_model
 def test_a_network_with_other_features_equals_the_loop(model, kind, name):

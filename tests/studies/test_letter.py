@@ -9,8 +9,10 @@ from msgspec.structs import asdict
 from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Estimate, Row, Summary
 from sainet.learning.recipes import PAPER
+from sainet.models.blocks import RelativePose
+from sainet.models.features import feature_set
 from sainet.studies import letter, load_study
-from sainet.studies.letter_units import MILLIMETRES
+from sainet.studies.letter_loss import MILLIMETRES, OUR_LOSS
 from sainet.studies.paper_setup import Sizes
 from sainet.studies.published_physics import NEAR, STUDY, closest, furthest, grid
 from support import require
@@ -45,17 +47,35 @@ def test_millimetres_instead_of_metres_change_only_l2():
     assert millimetres["l2"] == pytest.approx(metres["l2"] / 1000**2)
 
 
+def test_with_our_loss_each_stage_changes_only_the_inputs():
+    for stage in OUR_LOSS:
+        assert stage.recipe == PAPER.changed(features=stage.recipe.features)
+        assert all(n.features == stage.recipe.features for n in stage.networks())
+    sets = [
+        feature_set("direct-force", simulator=True, name=stage.recipe.features)
+        for stage in OUR_LOSS
+    ]
+    assert [each.has_table_axes for each in sets] == [True] + 4 * [False]
+    poses = [RelativePose() in each.blocks for each in sets]
+    assert poses == 2 * [True] + 3 * [False]
+    assert [each.are_standardised for each in sets] == 3 * [False] + 2 * [True]
+    assert [each.are_bounded for each in sets] == 4 * [False] + [True]
+
+
 @pytest.mark.slow
 def test_a_tiny_chain_compares_in_and_sain_of_every_stage(make, monkeypatch):
     require(find_spec("pybullet"), "PyBullet is not installed")
     monkeypatch.setattr(letter, "REDUCED", {"quick": Sizes(6, 4, 1)})
-    table = make("letter")
+    table, ours = make("letter"), make("letter-scaled-loss")
     models = {row["model"] for row in table["rows"]}
     wanted = {n.slug for stage in letter.CHAIN for n in stage.networks()}
     assert models == wanted | {"physics", "physics-true", "in-letter-small-l2"} | {
         "sain-bullet-letter-small-l2"
     }
     assert len(table["claims"]) == len(letter.CHAIN) + 1
+    models = {row["model"] for row in ours["rows"]}
+    wanted = {n.slug for stage in OUR_LOSS for n in stage.networks()}
+    assert models == wanted | {"physics", "physics-true"}
 
 
 def summary_of(errors):

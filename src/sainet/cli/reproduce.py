@@ -33,8 +33,9 @@ class Reproduce:
     """Studies: direct-force-two-disks (the paper's Table I), direct-force-three-disks
     (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
     regularisation and robustness, with the networks of Table III; published-physics,
-    letter, letter-millimetres, letter-noise and letter-weak-damper; feedforward,
-    varied-or-fixed and crossed-properties, at reduced size; simulated-control,
+    letter, letter-millimetres, letter-scaled-loss, letter-noise and
+    letter-weak-damper; feedforward, varied-or-fixed and crossed-properties, at reduced
+    size; simulated-control,
     control-any-number, control-in-the-way and adaptation, with shipped networks;
     any-number and gaps; expected-cost; robot-planar; engine-parity; pretrained (the
     shipped networks); fine-tuning (settings chosen on simulated pushes);

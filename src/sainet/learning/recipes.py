@@ -195,8 +195,9 @@ class Recipe:
     angle, with which the friction of a real surface varies. contact: features of each
     contact in its own frame (only around an engine). letter: the inputs of the paper's
     equations in SI units, along the table's axes. letter-push-frame: the same in the
-    push frame. whole-state: a feedforward network, for as many disks as in training.
-    nominal: the paper's features, with assumed masses and radii."""
+    push frame. letter-motion: with relative motion, too. unbounded: the paper's,
+    standardised but not bounded. whole-state: a feedforward network, for as many disks
+    as in training. nominal: the paper's features, with assumed masses and radii."""
     seed: int = 0
     """Random seed of the first weights, the order of the pushes and the validation
     pushes."""

@@ -50,6 +50,11 @@ class AbstractFeatures(ABC):
         """Whether the inputs and outputs are scaled by the training data."""
         return True
 
+    @property
+    def are_bounded(self) -> bool:
+        """Whether the scaled inputs are bounded smoothly."""
+        return True
+
     def axes(self, frame: PushFrame) -> PushFrame:
         """Return the frame in which the network sees a push: the push frame."""
         return frame
@@ -92,6 +97,7 @@ class FeatureSet(AbstractFeatures):
     blocks: tuple[Block, ...]
     has_si_units: bool = False  # or inputs that the training data scale
     has_table_axes: bool = False  # or those of the push frame
+    has_bounds: bool = True  # of scaled inputs
 
     def axes(self, frame: PushFrame) -> PushFrame:
         """Return the frame in which the network sees a push."""
@@ -101,6 +107,11 @@ class FeatureSet(AbstractFeatures):
     def are_standardised(self) -> bool:
         """Whether the inputs and outputs are scaled by the training data."""
         return not self.has_si_units
+
+    @property
+    def are_bounded(self) -> bool:
+        """Whether the scaled inputs are bounded smoothly."""
+        return self.are_standardised and self.has_bounds
 
     @property
     def pair_size(self) -> int:
@@ -153,6 +164,8 @@ def _joined(
 
 # By the letter of the paper: SI units as they are, relative poses with their angles.
 LETTER, LETTER_IN_PUSH_FRAME = "letter", "letter-push-frame"
+# On the way from there to the usual features: our relative motion, then our scales.
+LETTER_MOTION, UNBOUNDED = "letter-motion", "unbounded"
 
 
 def feature_set(kind: str, *, simulator: bool, name: str = "paper") -> FeatureSet:
@@ -161,14 +174,16 @@ def feature_set(kind: str, *, simulator: bool, name: str = "paper") -> FeatureSe
     Args:
         kind: setup whose controls the network takes, `robot` or `direct-force`.
         simulator: include the simulator prediction (SAIN).
-        name: of the features: `paper`, `place`, `letter` or `letter-push-frame`.
+        name: of the features: `paper`, `place`, or those by the letter and on the way.
     """
     optional = (SimulatedStep(),) if simulator else ()
-    by_letter = name in (LETTER, LETTER_IN_PUSH_FRAME)
-    relative = RelativePose() if by_letter else RelativeMotion()
+    has_poses = name in (LETTER, LETTER_IN_PUSH_FRAME)
+    has_si_units = has_poses or name == LETTER_MOTION
+    relative = RelativePose() if has_poses else RelativeMotion()
     blocks = (Motion(), *optional, relative, ACTIONS[kind], Properties())
     return FeatureSet(
         (*blocks, Place()) if name == "place" else blocks,
-        has_si_units=by_letter,
+        has_si_units=has_si_units,
         has_table_axes=name == LETTER,
+        has_bounds=name != UNBOUNDED,
     )

@@ -14,13 +14,16 @@ TrainingData = Literal["paper", "stroke", "simulation", "tuned", "residual", "re
 ModelKind = Literal["in", "sain"]  # of networks
 # Beyond the paper's: "contact" is the form of contact networks, "whole-state" that of
 # feedforward networks. "letter" takes the inputs of the paper's equations as they are,
-# see `models.features`; "nominal": the paper's, of assumed masses and radii.
+# see `models.features`, as for those between it and "paper"; "nominal": the paper's, of
+# assumed masses and radii.
 Features = Literal[
     "paper",
     "place",
     "contact",
     "letter",
     "letter-push-frame",
+    "letter-motion",
+    "unbounded",
     "whole-state",
     "nominal",
 ]
@@ -38,6 +41,7 @@ Variant = Literal[
     "large-l2",
     "small-l2",
     "millimetres",
+    "scaled-loss",
     "chosen",
 ]
 
@@ -52,10 +56,13 @@ _VARIANTS = {
     "one-to-four": "mixed",  # numbers of disks
     "letter": "by the letter",
     "letter-push-frame": "by the letter but in the push frame",
+    "letter-motion": "by the letter but with relative motion",
+    "unbounded": "unbounded inputs",
     "loss-in-metres": "loss in metres",
     "large-l2": "large l2",
     "small-l2": "small l2",
     "millimetres": "loss in millimetres",
+    "scaled-loss": "scaled loss",
     "three-disks": "3 disks",
     "fixed-properties": "fixed properties",
     "nominal": "nominal inputs",

@@ -93,7 +93,8 @@ class InteractionNetwork(AbstractNetwork):
     def _scaled(self, inputs: Array, mean: Array, deviation: Array) -> Array:
         if not self.features.are_standardised:
             return inputs
-        return standardise(inputs, mean, deviation)
+        is_bounded = self.features.are_bounded
+        return standardise(inputs, mean, deviation, is_bounded=is_bounded)
 
     def _effects(self, moment: Moment) -> Float[Array, "effect body push"]:
         """Sum the effects on each body: e_i = sum over j != i of f_rel(i, j).

@@ -178,13 +178,15 @@ def silenced(layers: Layers) -> Layers:
     return eqx.tree_at(last, layers, replace_fn=jnp.zeros_like)
 
 
-def standardise(x: Array, mean: Array, deviation: Array) -> Array:
+def standardise(
+    x: Array, mean: Array, deviation: Array, *, is_bounded: bool = True
+) -> Array:
     """Bring features to unit size and bound them smoothly.
 
-    Contacts kick: without the bound, 200 steps of back-propagation explode.
+    Contacts kick: without the bound, 200 steps of back-propagation may explode.
     """
     scaled = (x - like(mean, x)) / like(deviation, x)
-    return FEATURE_BOUND * jnp.tanh(scaled / FEATURE_BOUND)
+    return FEATURE_BOUND * jnp.tanh(scaled / FEATURE_BOUND) if is_bounded else scaled
 
 
 def unit_scales(features: AbstractFeatures) -> Scales:

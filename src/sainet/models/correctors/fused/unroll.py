@@ -66,7 +66,7 @@ def unroll_fused(
         interpret: run without a GPU, slowly, for tests.
     """
     del before
-    settings = Settings(network.features.are_standardised, interpret)
+    settings = Settings(network.features.are_bounded, interpret)
     problem = _problem(network, initial, still, drive)
     path: Path = predict(settings, problem, _weights(network))  # pyright: ignore[reportAssignmentType]
     return _from_blocks(path)[:, : initial.shape[0]]
