@@ -366,6 +366,7 @@ CONNECTIONS = {
     "inputs between those by the letter and ours": 20,
     "screening of pushes": 20,
     "timing starts, processes loaded on demand": 7,
+    "pushes in two datasets, a split into another run": 14,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.
     "many machines": 245,

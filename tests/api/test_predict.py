@@ -1,5 +1,6 @@
 """Models predict pushes that are given as plain numbers, single or in batches."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -136,6 +137,16 @@ def test_parts_that_do_not_fit_are_refused():
     two = jax.tree.map(lambda x: jnp.stack([x, x]), SCENE.in_a_row())
     with pytest.raises(BadScene, match=r"leading axes .* are \(\), \(2,\), \(3,\)"):
         physics.predict(SCENE, two, sn.Push(ANGLES))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("field", ["position", "angle", "pusher_position"])
+def test_a_state_that_is_not_finite_is_refused(field, value):
+    physics, state = sn.load("physics"), SCENE.in_a_row()
+    at = lambda s: getattr(s, field)  # noqa: E731
+    bad = eqx.tree_at(at, state, at(state).at[0].set(value))
+    with pytest.raises(BadScene, match=f"^state: {field} holds NaN or infinity"):
+        physics.predict(SCENE, bad, sn.Push(0.0))
 
 
 def test_no_pushes_have_an_empty_prediction(model):

@@ -99,6 +99,9 @@ def test_parts_become_datasets_like_any_other(store, tmp_path):
     assert again[0].content == train.content
     with pytest.raises(RunConflict, match="seed is 2"):
         write_split(store, tmp_path / "out", test=0.4, seed=3)
+    with pytest.raises(RunConflict, match="train: holds another run"):
+        write_split(store, train.path)
+    assert not (train.path / "train").exists()
 
 
 @pytest.mark.parametrize(

@@ -126,6 +126,8 @@ def test_datasets_that_do_not_belong_together_are_refused(stores, tmp_path):
     without = write(tmp_path / "without", info, arrays)
     with pytest.raises(BadStore, match="without: no simulator prediction of planar"):
         fit("sain", [stores[1], without], RECIPE, tmp_path / "out")
+    with pytest.raises(BadStore, match="[0-9]+ of its pushes are in .*, too"):
+        fit("sain", [stores[0], stores[1], stores[0]], RECIPE, tmp_path / "out")
     with pytest.raises(BadInput, match="`data` is empty"):
         fit("sain", [], RECIPE, tmp_path / "out")
     assert not (tmp_path / "out").exists()

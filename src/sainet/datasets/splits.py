@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sainet.datasets.store import Store, open_store
+from sainet.datasets.store import Store
 from sainet.datasets.writer import write_once
-from sainet.runs.errors import BadInput, require
+from sainet.runs.errors import BadInput, RunConflict, require
+from sainet.runs.manifest import MANIFEST
 from sainet.scenes.quantities import require_count
 
 _SPLIT_STREAM, _FOLD_STREAM = 0x5B117, 0xF01D
@@ -191,13 +192,15 @@ def write_split(
     parts = split(store, test, seed, chains=chains)
     settings = {"command": "split", "data": store.content, "test": float(test)}
     settings |= {"seed": int(seed), "chains": chains}
-    written = []
-    for name, part in zip(("train", "test"), parts, strict=True):
+    if (Path(out) / MANIFEST).exists():
+        raise RunConflict(f"{out}: holds another run; choose another `out`.")
+    train, tests = (
         write_once(
             Path(out) / name,
             settings | {"part": name},
             part.info,
             lambda index, part=part: part.read(part.info.chunk_slice(index)),
         )
-        written.append(open_store(Path(out) / name))
-    return written[0], written[1]
+        for name, part in zip(("train", "test"), parts, strict=True)
+    )
+    return train, tests

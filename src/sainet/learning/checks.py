@@ -1,11 +1,27 @@
 """Checks that a training job can run, before its folder is made."""
 
+from collections.abc import Sequence
+
+import numpy as np
+
+from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS, PlanarSpec, SimulatorSpec
 from sainet.learning.recipes import FROM_ENGINE
 from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD
 from sainet.models.identity import NETWORKS
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, require_one_of
+
+
+def check_apart(stores: Sequence[Store]) -> None:
+    """Raise `BadStore` if a push is in two datasets."""
+    for index, store in enumerate(stores):
+        for other in stores[:index]:
+            if twice := len(np.intersect1d(store.push_hashes(), other.push_hashes())):
+                raise BadStore(
+                    f"{store.path}: {twice} of its pushes are in {other.path}, too; "
+                    "give each push once."
+                )
 
 
 def check_task(task: Task) -> None:

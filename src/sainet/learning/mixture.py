@@ -14,7 +14,7 @@ from jaxtyping import UInt64
 
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.store import Store
-from sainet.learning.checks import check_task
+from sainet.learning.checks import check_apart, check_task
 from sainet.learning.loss import LossWeights
 from sainet.learning.sources import source_of
 from sainet.learning.step import FitState, data_loss, even_batch, first_state
@@ -75,10 +75,12 @@ class Mixture:
         """Check every job, and that the datasets belong together.
 
         Raises:
-            BadStore: a dataset lacks inputs, or differs from the first.
+            BadStore: a dataset lacks inputs, differs from the first, or shares pushes
+                with another one.
             BadInput: the recipe does not fit the model or the data.
             BadCheckpoint: training cannot start from its network.
         """
+        check_apart(self.stores)
         first = self.lead.store
         for task in self.tasks:
             check_task(task)
@@ -92,12 +94,11 @@ class Mixture:
 
     def begin(self) -> tuple[FitState, list[LossWeights]]:
         """Return the first state, and the weights of the loss for each dataset."""
-        found = [statistics(task) for task in self.tasks]
-        scales = [each for each, _ in found]
+        scales, weights = zip(*map(statistics, self.tasks), strict=True)
         pooled = pool(scales, [store.info.bodies for store in self.stores])
         network = first_network(self.lead, pooled)
         state = first_state(network, self.lead.recipe.optimiser)
-        return state, [weights for _, weights in found]
+        return state, [*weights]
 
     def validate(self, weights: Sequence[LossWeights]) -> Validate | None:
         """Return a function that measures the loss on the validation pushes, if any."""

@@ -30,7 +30,7 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.pushes import Push
 from sainet.scenes.quantities import MOST_STEPS, require_count
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, Trajectory
+from sainet.scenes.state import State, Trajectory, check_state
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,8 @@ class Model:
             `trajectory.final` the last state; batches have a leading axis.
 
         Raises:
-            BadScene: a push is out of range, or the parts do not fit each other.
+            BadScene: a push is out of range, the state is not finite, or the parts do
+                not fit each other.
             BadCheckpoint: the network is for other pushes or another time step.
             BadInput: the model is not JAX, and the push is traced.
             BadSetting: a part is not of its type, or the number of steps is no whole
@@ -120,6 +121,8 @@ class Model:
         if steps is not None:
             require_count("steps", steps, high=MOST_STEPS)
         check_kinds(scene, state, push)
+        if not is_traced(state):
+            check_state(state)
         if scene.body_count != state.body_count:
             raise BadScene(
                 f"state: it has {state.body_count} disks, the scene {scene.body_count}."
@@ -129,13 +132,12 @@ class Model:
                 f"{self.name} does not run in JAX, which cannot trace it; give a batch "
                 "of pushes."
             )
-        disks = scene.body_count
-        check_purpose(self.dynamics, kind_of(push), scene.time_step, disks)
+        check_purpose(self.dynamics, kind_of(push), scene.time_step, scene.body_count)
         if not isinstance(push, Push):
             return predict(self.dynamics, scene, state, push)
         steps = steps_of(push, scene.time_step) if steps is None else steps
         check_axes(scene, state, push)
-        if disks > 1 and not is_traced(push):
+        if scene.body_count > 1 and not is_traced(push):
             self._warn_of_untrained(push)
         run = predict_push if self.dynamics.on_host else compiled
         return run(self.dynamics, scene, state, push, steps)

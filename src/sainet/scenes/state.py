@@ -169,4 +169,4 @@ def check_state(state: State, source: str = "state") -> None:
     pusher = ("pusher_position", "pusher_velocity")
     for name in ("position", "angle", "velocity", "spin", *pusher):
         if not np.isfinite(np.asarray(getattr(state, name))).all():
-            raise BadScene(f"{source}: {name} holds NaN or infinity; remove that push.")
+            raise BadScene(f"{source}: {name} holds NaN or infinity; give numbers.")

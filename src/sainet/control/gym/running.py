@@ -28,8 +28,7 @@ class RunningTrial:
     def begin(cls, trial: Trial) -> "RunningTrial":
         """Observe the disks at the start."""
         pose = poses_of(trial.robot.observe())
-        goal = np.asarray(trial.task.goal)
-        return cls(trial, View.around(np.vstack([pose[:, :2], goal])), pose)
+        return cls(trial, View.around(np.vstack([pose[:, :2], trial.task.goal])), pose)
 
     @property
     def goal(self) -> Float[np.ndarray, "2"]:
