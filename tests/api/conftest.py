@@ -14,6 +14,12 @@ SMALL = GenerateConfig(
 )
 
 
+@pytest.fixture
+def small() -> GenerateConfig:
+    """The settings of `pushes`."""
+    return SMALL
+
+
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
     """Twelve short simulated pushes of two disks, where the program looks for them."""

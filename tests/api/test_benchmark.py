@@ -28,6 +28,13 @@ SIMULATED = {
 }
 
 
+def travels(pushes) -> np.ndarray:
+    """How far each disk of each push travels (mm), from its start to its last pose."""
+    batch = pushes.batch()
+    travel = np.asarray(batch.truth)[:, -1, :, :2] - np.asarray(batch.initial.position)
+    return 1000 * np.linalg.norm(travel, axis=-1)
+
+
 @pytest.fixture
 def tiny(pushes, monkeypatch) -> benchmark.Track:
     """A track of the twelve short pushes."""
@@ -36,6 +43,7 @@ def tiny(pushes, monkeypatch) -> benchmark.Track:
         study="robot-two-disks",
         command="sainet generate",
         hash=benchmark.hash_of(pushes),
+        travel_mm=tuple(travels(pushes).mean(axis=0).tolist()),
     )
     known = benchmark.tracks() | {TINY: made}
     monkeypatch.setattr(benchmark, "tracks", lambda: known)
@@ -161,6 +169,8 @@ def test_the_hash_of_recorded_pushes_is_that_of_the_import(
 ):
     store = import_endpoints(recorded_pushes_folder / "ellip1_endpoints.csv", tmp_path)
     assert benchmark.hash_of(store) == sn.track("recorded").hash
+    measured = sn.evaluate(["physics"], store).measured
+    sn.track("recorded").check_travel(measured, store.path)
     assert set(sn.track("recorded").fold_of_push(store)) == set(range(5))
 
 
@@ -172,13 +182,33 @@ def test_the_hash_of_simulated_pushes_is_that_of_the_stored_measurements(tmp_pat
     assert benchmark.hash_of(pushes) == sn.track("table-3").hash
     stored = REPOSITORY / "results" / "robot-two-disks.nc.xz"
     require(stored.is_file(), "the measurements are not in this copy")
-    batch = pushes.batch()
-    travel = np.asarray(batch.truth)[:, -1, :, :2] - np.asarray(batch.initial.position)
-    np.testing.assert_allclose(
-        1000 * np.linalg.norm(travel, axis=-1),
-        read_measurements(stored).data["travel_mm"].values,
-        rtol=1e-4,
-    )
+    # Processors differ in last bits, which the contacts of a few pushes amplify.
+    known = read_measurements(stored).data["travel_mm"].values
+    off = np.abs(travels(pushes) - known)
+    assert off.max() < 0.3
+    assert np.quantile(off, 0.8) < 1e-3
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_the_disks_of_a_track_travel_as_far_as_in_its_study(name):
+    chosen = sn.track(name)
+    stored = REPOSITORY / "results" / f"{chosen.study}.nc.xz"
+    require(stored.is_file(), "the measurements are not in this copy")
+    chosen.check_travel(read_measurements(stored), stored)
+
+
+def test_pushes_of_another_engine_are_refused(tiny, small, tmp_path):
+    """Their starts and commands, hence their hash, are the same."""
+    pytest.importorskip("pybullet")
+    config = replace(small, engine="bullet")
+    other = sn.generate(config, tmp_path / "other", progress=False)
+    assert benchmark.hash_of(other) == tiny.hash
+    pose = np.asarray(other.batch().truth)[..., :3]
+    np.savez(tmp_path / "mine.npz", hash=other.hashes, pose=pose)
+    with pytest.raises(
+        BadInput, match=r"other: the disks travel .* mm on average, not \("
+    ):
+        sn.score(tmp_path / "mine.npz", TINY, other)
 
 
 @pytest.fixture

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _WIDTH = 160  # characters of the printed table
 _PAGE = ".html"
+_TOLD = ("pos_mm", "rot_deg")  # errors in sentences
 
 
 @dataclass(frozen=True, repr=False)
@@ -83,20 +84,12 @@ class ErrorTable:
         """Yield in which errors networks are better or worse than other models."""
         summary = self.summary
         networks = [each.slug for each in summary.models if each.kind in LEARNED]
-        others = [
-            each.slug
-            for each in summary.models
-            if each.kind == "physics" and each.slug not in (BASELINE, TRUE_PROPERTIES)
-        ]
+        engines = [each.slug for each in summary.models if each.kind == "physics"]
+        others = [slug for slug in engines if slug not in (BASELINE, TRUE_PROPERTIES)]
         for condition in summary.conditions:
             where = f"{condition.label}: " if condition.label else ""
             for pair in product(networks, others):
-                found = places(
-                    summary,
-                    *pair,
-                    metrics=("pos_mm", "rot_deg"),
-                    condition=condition.label,
-                )
+                found = places(summary, *pair, metrics=_TOLD, condition=condition.label)
                 yield f"{where}{worded_places(found, summary)}"
 
     def to_pandas(self) -> "DataFrame":
