@@ -32,8 +32,8 @@ from sainet.studies.steps import Evaluate, Join, Simulate, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.noise import NoiseLevel
 
-NETWORKS = (IN, SAIN_BULLET)
 TRAININGS = 3  # of each network, at reduced size
+NOISES = "no noise", "default noise", "paper-like noise"
 _ALL_STEPS = 480  # of a push by a force
 _TRAINING_SEED, _TEST_SEED = 0, 1
 
@@ -49,7 +49,7 @@ class Stage:
 
     def networks(self) -> Iterator[ModelId]:
         """Yield IN and SAIN of this stage."""
-        for network in NETWORKS:
+        for network in (IN, SAIN_BULLET):
             yield structs.replace(network, features=self.features, variant=self.variant)
 
 
@@ -138,10 +138,10 @@ def _chain(scope: Scope) -> Plan:
 def _noise(scope: Scope) -> Plan:
     """Return the errors of both ends of the chain, at full size, at each noise."""
     parts, sizes = [], SIZES if scope.scale == "paper" else REDUCED
-    for level in get_args(NoiseLevel):
+    for level, label in zip(get_args(NoiseLevel), NOISES, strict=True):
         config = GenerateConfig(noise_level=level)
         world = World(f"letter-{level}", scope.scale, sizes[scope.scale], config)
-        named = Condition(label=f"{level} noise", factors={"noise_level": level})
+        named = Condition(label=label, factors={"noise_level": level})
         parts.append(world.compare((LETTER, USUAL), range(1), named))
     return Plan(Join(tuple(parts)))
 
@@ -178,8 +178,8 @@ NOISE_STUDY = Study(
     plan=_noise,
     claims=tuple(
         claim
-        for level, stage in product(get_args(NoiseLevel), (LETTER, USUAL))
-        for claim in sain_errs_less((stage,), f"{level} noise")
+        for noise, stage in product(NOISES, (LETTER, USUAL))
+        for claim in sain_errs_less((stage,), noise)
     ),
 )
 WEAK_DAMPER_STUDY = Study(

@@ -96,9 +96,9 @@ def helpers(evidence: Evidence) -> dict[str, object]:
 def trainings(summary: Summary) -> str:
     """Return training runs of each network, and test pushes, in words."""
     runs = sorted({row.trainings for row in summary.rows if row.trainings > 1})
-    pushes = sorted({row.count for row in summary.rows if row.count})
-    counts = " or ".join(map(str, runs)) or "one"
-    return f"{counts} training runs of each network; {pushes[-1]} test pushes"
+    most = max(row.count for row in summary.rows if row.count)
+    count, s = " or ".join(map(str, runs)) or "one", "s" * bool(runs)
+    return f"{count} training run{s} of each network; {most} test pushes"
 
 
 def errors(
