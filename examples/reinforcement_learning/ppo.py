@@ -9,6 +9,7 @@ be solved after a million pushes, which take some minutes.
 """
 
 import sys
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -20,7 +21,16 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor
 
 import sainet  # noqa: F401  (registers the environment)
 
-OPTIONS: dict[str, Any] = {"actions": "continuous", "reward": "dense", "pushes": 60}
+
+def make_worlds(count: int, mode: str = "NextStep") -> gymnasium.vector.VectorEnv:
+    """Return simulated worlds with continuous pushes and dense rewards."""
+    return gymnasium.make_vec(
+        "sainet/PushDisks-v0",
+        num_envs=count,
+        actions="continuous",
+        reward="dense",
+        autoreset_mode=mode,
+    )
 
 
 class Worlds(VecEnv):
@@ -28,9 +38,9 @@ class Worlds(VecEnv):
 
     def __init__(self, worlds: gymnasium.vector.VectorEnv) -> None:
         """Take worlds that begin the next trial in the step that ends the last one."""
+        self.worlds = worlds
         spaces = worlds.single_observation_space, worlds.single_action_space
         super().__init__(worlds.num_envs, *spaces)
-        self.worlds = worlds
 
     def reset(self) -> dict[str, np.ndarray]:
         """Begin a trial in every world."""
@@ -89,17 +99,14 @@ class InRow(BaseFeaturesExtractor):
         return 30 * torch.stack((ahead, beside, 10 * (apart - 0.113)), dim=-1)
 
 
-def solved(policy: str, model: PPO, goals: int = 100) -> int:
-    """Return how many goals of another seed are reached."""
-    worlds = gymnasium.make_vec("sainet/PushDisks-v0", num_envs=goals, **OPTIONS)
-    worlds.action_space.seed(0)
+def solved(
+    worlds: gymnasium.vector.VectorEnv, policy: Callable[[Any], np.ndarray]
+) -> int:
+    """Return in how many worlds a policy reaches its first goal of another seed."""
     seen, _ = worlds.reset(seed=1000)
-    reached, over = np.zeros(goals, bool), np.zeros(goals, bool)
+    reached, over = np.zeros(worlds.num_envs, bool), np.zeros(worlds.num_envs, bool)
     while not over.all():
-        actions = worlds.action_space.sample()
-        if policy == "learned":
-            actions, _ = model.predict(seen, deterministic=True)
-        seen, _, terminated, truncated, infos = worlds.step(actions)
+        seen, _, terminated, truncated, infos = worlds.step(policy(seen))
         reached |= terminated & ~over & infos["is_success"]
         over |= terminated | truncated
     return int(reached.sum())
@@ -107,12 +114,9 @@ def solved(policy: str, model: PPO, goals: int = 100) -> int:
 
 if __name__ == "__main__":
     pushes = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
-    worlds = gymnasium.make_vec(
-        "sainet/PushDisks-v0", num_envs=256, autoreset_mode="SameStep", **OPTIONS
-    )
     model = PPO(
         "MultiInputPolicy",
-        VecMonitor(Worlds(worlds)),
+        VecMonitor(Worlds(make_worlds(256, "SameStep"))),
         policy_kwargs={"features_extractor_class": InRow, "log_std_init": -0.5},
         n_steps=32,  # pushes in each world between two updates
         batch_size=2048,
@@ -123,5 +127,11 @@ if __name__ == "__main__":
     )
     model.learn(pushes, log_interval=5)
     model.save("ppo.zip")
-    for policy in ("learned", "random"):
-        print(f"{policy}: {solved(policy, model)} of 100 goals")
+    tests = make_worlds(100)
+    tests.action_space.seed(0)
+    policies = {
+        "learned": lambda seen: model.predict(seen, deterministic=True)[0],
+        "random": lambda seen: tests.action_space.sample(),
+    }
+    for name, policy in policies.items():
+        print(f"{name}: {solved(tests, policy)} of 100 goals")

@@ -27,7 +27,7 @@ from sainet.runs.errors import BadInput, shown, unknown_name
 
 _REMEDY = "write it again with `score`"
 # mm. Contacts amplify the last bits, in which processors differ: the mean travel then
-# changes by 0.0003 mm, and by 0.03 mm or more with another engine.
+# changes by 0.0003 mm; with another engine that of some disk by 0.06 mm or more.
 _SAME_TRAVEL = 0.003
 # They stand in Markdown and HTML.
 _Text = Annotated[str, Meta(pattern=r"\A[^\n<>|\[\]`\\]*\Z", max_length=100)]
@@ -67,10 +67,10 @@ class Track(Struct, frozen=True, kw_only=True):
     def check_travel(self, measured: Measurements, where: Path) -> None:
         """Raise `BadInput` unless the disks travel as far as those of the track."""
         found = measured.data["travel_mm"].values.mean(axis=0)
-        if np.abs(found - self.travel_mm).max() > _SAME_TRAVEL:
+        if not np.allclose(found, self.travel_mm, rtol=0, atol=_SAME_TRAVEL):  # or NaN
             raise BadInput(
-                f"{where}: the disks travel {found.round(3)} mm on average, not "
-                f"{self.travel_mm}; run '{self.command}'."
+                f"{where}: the disks travel {(*found.round(3).tolist(),)} mm on "
+                f"average, not {self.travel_mm}; run '{self.command}'."
             )
 
     def scored(self, rows: tuple[Row, ...], where: Path) -> tuple[Row, ...]:
