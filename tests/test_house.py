@@ -244,7 +244,11 @@ CHOOSING = (
     "studies/active_choice",
     "studies/recorded_few",
 )
-ENSEMBLES = ("models/ensemble", "learning/ensemble")
+ENSEMBLES = (
+    "models/ensemble",
+    "learning/ensemble",
+    "studies/recorded_ensembles",
+)
 ADAPTATION = ("identification/adaptation", "studies/adaptation")
 
 EXPECTED_COST = ("planning/expectation", "studies/expected_cost")

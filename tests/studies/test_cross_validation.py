@@ -67,10 +67,12 @@ def printed(command):
 def test_each_push_is_tested_once_by_models_that_did_not_see_it(recorded):
     store = open_store(recorded)
     models = candidates_named(["gp-angle"])
-    parts, unions = cross_validated(store, ("kind",), FOLDS, models)
-    assert [condition.parts for condition in unions] == [("kind, felt", "kind, wood")]
+    whole = cross_validated(store, ("kind",), FOLDS, models)
+    assert [condition.parts for condition in whole.unions] == [
+        ("kind, felt", "kind, wood")
+    ]
     hashes, tested = store.push_hashes(), []
-    for part in parts:
+    for part in whole.parts:
         for step in part.parts:
             seen = step.engine.pushes.store
             assert {each.engine for each in step.fitted} == {step.engine}

@@ -19,11 +19,10 @@ from support import require
 PUSHES = 48
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
-    """Pushes of one disk that start at many places, in pairs of repeats."""
+def _recorded(folder, pushes):
+    """Return pushes of one disk that start at many places, in pairs of repeats."""
     info = info_of(
-        PUSHES,
+        pushes,
         engine="recorded",
         seed=None,
         bodies=1,
@@ -32,10 +31,17 @@ def recorded(tmp_path_factory):
         has_repeats=True,
     )
     arrays = end_points_alone(made_up(info))
-    arrays |= {"repeat": np.repeat(np.arange(PUSHES // 2), 2)}
+    arrays |= {"repeat": np.repeat(np.arange(pushes // 2), 2)}
+    arrays |= {"mass": np.ones_like(arrays["mass"])}
     names = ("table_friction", "disk_friction", "pusher_friction")
-    arrays |= dict.fromkeys(names, np.full(PUSHES, 0.3))
-    return write(tmp_path_factory.mktemp("few") / "data", info, arrays).path
+    arrays |= dict.fromkeys(names, np.full(pushes, 0.3))
+    return write(folder / "data", info, arrays).path
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Pushes of one disk."""
+    return _recorded(tmp_path_factory.mktemp("few"), PUSHES)
 
 
 @pytest.fixture(autouse=True)
@@ -73,6 +79,28 @@ def test_orders_begin_alike_and_are_tested_on_other_kinds(
     physics = measured.values("final_pos_mm", "physics-identified").ravel()
     assert (physics[first] == physics[later]).all()
     assert first.sum() == PUSHES / 4
+
+
+@pytest.mark.parametrize(
+    ("scale", "schemes", "iterations"),
+    [("quick", ["kind"], 10), ("paper", ["kind", "place"], 1200)],
+)
+def test_networks_and_ensembles_share_their_folds(tmp_path, scale, schemes, iterations):
+    recorded = _recorded(tmp_path, 120)
+    plan = load_study("recorded-ensembles").plan(Scope(scale, recorded))
+    parts = plan.measured.parts
+    assert [part.condition.label for part in parts] == schemes
+    for part in parts:
+        for fold in part.parts:
+            *networks, process = (each.candidate for each in fold.fitted)
+            assert process.identity.slug == "gp-identified-place"
+            features = ("paper", "place") if scale == "paper" else ("paper",)
+            assert [(n.features, n.identity.variant) for n in networks] == [
+                (name, variant) for name in features for variant in ("", "ensemble")
+            ]
+            pushes = fold.engine.pushes.store
+            trained = {n._recipe(pushes).optimiser.iterations for n in networks}
+            assert trained == {iterations}
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ class CrossValidate:
 
         store = open_part(self.data, self.group, self.pushes)
         models = candidates_named(self.models)
-        parts, _ = cross_validated(store, self.by, self.folds, models)
+        parts = cross_validated(store, self.by, self.folds, models).parts
         given = {"by": self.by, "folds": self.folds, "models": self.models}
         settings = {"command": "cross-validate", "data": store.content, **given}
         shard = self.machines.share

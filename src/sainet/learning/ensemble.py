@@ -171,8 +171,7 @@ def _calibrate(dynamics: Ensemble, camera: CameraOffset, held: Store) -> _Calibr
     lacking = np.maximum(variance - own, _LEAST * variance)
     floor = np.sqrt(np.stack([lacking[:, :2].mean(axis=1), lacking[:, 2]], axis=-1))
     floor = np.maximum(floor, _TINY)
-    wide = floor[:, [0, 0, 1]]
-    scaled = missed / np.sqrt(spread**2 + wide**2)
+    scaled = missed / np.sqrt(spread**2 + floor[:, [0, 0, 1]] ** 2)
 
     def sizes(off: np.ndarray) -> Float[np.ndarray, "push body 2"]:
         place = np.hypot(off[..., 0], off[..., 1])

@@ -59,6 +59,7 @@ STUDIES = {
     "recorded-pushes": "sainet.studies.recorded_pushes:STUDY",
     "recorded-trust": "sainet.studies.recorded_trust:STUDY",
     "recorded-chosen": "sainet.studies.recorded_trust:CHOSEN_STUDY",
+    "recorded-ensembles": "sainet.studies.recorded_ensembles:STUDY",
     "recorded-few": "sainet.studies.recorded_few:STUDY",
     "recorded-active": "sainet.studies.active_choice:RECORDED_STUDY",
     "recorded-data-efficiency": "sainet.studies.data_efficiency:RECORDED",

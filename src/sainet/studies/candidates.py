@@ -18,7 +18,8 @@ from sainet.learning.recipes import RESIDUAL, Recipe
 from sainet.models.identity import Features, ModelId, ProcessFeatures
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.errors import unknown_name
-from sainet.studies import MEMBERS, CandidateName
+from sainet.studies import MEMBERS, CandidateName, Scale
+from sainet.studies.paper_setup import scaled
 from sainet.studies.recorded_models import IDENTIFIED
 
 
@@ -89,6 +90,7 @@ class NetworkCandidate(Candidate):
     """An additive network around the engine."""
 
     features: Features
+    scale: Scale = "paper"
 
     @property
     def identity(self) -> ModelId:
@@ -105,8 +107,8 @@ class NetworkCandidate(Candidate):
         fit("sain", store, self._recipe(store), folder, assumed_engine=internal)
 
     def _recipe(self, store: Store) -> Recipe:
-        batch = min(RESIDUAL.optimiser.batch_size, store.info.pushes)
-        return RESIDUAL.changed(features=self.features, batch_size=batch)
+        recipe = RESIDUAL.changed(features=self.features)
+        return scaled(recipe, self.scale, store.info.pushes)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from sainet.studies.recorded_models import IDENTIFIED, surfaces_of
 from sainet.studies.recorded_pushes import JoinFolds
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Apart, Given, Step
-from sainet.studies.study import MEASUREMENTS
+from sainet.studies.study import MEASUREMENTS, Scope
 
 PHYSICS_IDENTIFIED = ModelId(kind="physics", simulator=IDENTIFIED)
 
@@ -132,7 +132,7 @@ def fitted_and_tested(
 
 def cross_validated(
     store: Store, schemes: Sequence[Scheme], count: int, models: Sequence[Candidate]
-) -> tuple[list[Step[Measurements]], list[Condition]]:
+) -> WithUnions:
     """Return the measurements of each division and surface, and their unions.
 
     Args:
@@ -164,4 +164,12 @@ def cross_validated(
             parts.append(JoinFolds(tuple(tests), folds, condition))
         if len(surfaces) > 1:
             unions.append(Condition(label=scheme, parts=tuple(labels.values())))
-    return parts, unions
+    return WithUnions(tuple(parts), tuple(unions))
+
+
+def divided(
+    scope: Scope, store: Store, schemes: Sequence[Scheme], models: Sequence[Candidate]
+) -> WithUnions:
+    """Return the measurements of divisions into folds, at the quick scale of one."""
+    schemes, count = (schemes, 5) if scope.scale == "paper" else (schemes[:1], 2)
+    return cross_validated(store, schemes, count, models)

@@ -30,14 +30,13 @@ from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
     EvaluateFitted,
     WithUnions,
-    cross_validated,
+    divided,
     fitted_and_tested,
 )
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Step
 from sainet.studies.study import RECORDED, Plan, Scope, Study
 
-FOLDS = {"quick": 2, "paper": 5}
 PROCESSES = tuple(ProcessCandidate(features) for features in ADDED)
 CHOSEN = (ChosenProcess("side"), ChosenProcess("place"))
 FITTED = (PHYSICS_IDENTIFIED, *(each.identity for each in PROCESSES))
@@ -87,10 +86,7 @@ def _chosen(scope: Scope) -> Plan:
 
 def _within(scope: Scope, models: Sequence[ProcessCandidate]) -> WithUnions:
     """Return the measurements of all divisions into folds."""
-    schemes = ("kind", *BLOCKED) if scope.scale == "paper" else ("kind",)
-    pushes, count = scope.recorded_pushes(), FOLDS[scope.scale]
-    parts, unions = cross_validated(pushes, schemes, count, models)
-    return WithUnions(tuple(parts), tuple(unions))
+    return divided(scope, scope.recorded_pushes(), ("kind", *BLOCKED), models)
 
 
 def _elsewhere(store: Store) -> Iterator[EvaluateFitted]:

@@ -116,8 +116,11 @@ class Scope:
         wanted = 1 if self.scale == "quick" else trainings
         return range(first, first + min(wanted, self.trainings or wanted))
 
-    def recorded_pushes(self) -> Store:
+    def recorded_pushes(self, quick: int | None = None) -> Store:
         """Return the recorded pushes; at the quick scale a few of each group.
+
+        Args:
+            quick: how many of each group; default: 40.
 
         Raises:
             MissingInput: none were given.
@@ -129,16 +132,15 @@ class Scope:
                 "mitpush-endpoints' made of recorded pushes."
             )
         store = open_store(self.recorded)
-        return store if self.scale == "paper" else _some_of_each_group(store)
+        return store if self.scale == "paper" else _some_of_each_group(store, quick)
 
 
-def _some_of_each_group(store: Store) -> Store:
+def _some_of_each_group(store: Store, most: int | None) -> Store:
     """Return pushes from the whole of each group, in their order."""
     group = store.read(slice(None), ("group",))["group"]
     chosen: list[np.ndarray] = []
-    for code in np.unique(group):
-        rows = np.flatnonzero(group == code)
-        few = np.linspace(0, len(rows) - 1, min(len(rows), QUICK_RECORDED))
+    for rows in (np.flatnonzero(group == code) for code in np.unique(group)):
+        few = np.linspace(0, len(rows) - 1, min(len(rows), most or QUICK_RECORDED))
         chosen.append(rows[few.round().astype(int)])
     return store.take(np.sort(np.concatenate(chosen)))
 

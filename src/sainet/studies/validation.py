@@ -22,7 +22,6 @@ from sainet.report.table import Table
 from sainet.studies.candidates import Candidate
 from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
-    WithUnions,
     cross_validated,
 )
 from sainet.studies.runner import Runner
@@ -117,6 +116,5 @@ def cross_validate(
         BadStore: the pushes do not suffice for so many folds, or for a model.
         BadInput: the inputs of a model are the same in all pushes.
     """
-    parts, unions = cross_validated(store, schemes, count, models)
-    measured = runner.result(WithUnions(tuple(parts), tuple(unions)))
+    measured = runner.result(cross_validated(store, schemes, count, models))
     return Validation(measured, tuple(schemes), tuple(models))
