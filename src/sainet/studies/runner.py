@@ -83,9 +83,6 @@ class Bar:
         self.report(Progress(self.title, done, self.total, note, left=left))
 
 
-Together = Callable[[Train, Iterable[Step[Any]], "Runner"], None]
-
-
 @dataclass
 class Runner:
     """Runs steps after their inputs; finished ones are not repeated.
@@ -101,7 +98,7 @@ class Runner:
     ahead: Sequence[Step[Any]] = ()  # of which results will be asked for, in this order
     clock: Clock = field(default_factory=Clock)
     # Trains, beside a network, those of further steps that are like it.
-    together: "Together | None" = None
+    together: "Callable[[Train, Iterable[Step[Any]], Runner], None] | None" = None
     _results: dict[str, object] = field(default_factory=dict)
     _errors: dict[str, SainetError] = field(default_factory=dict)
     _running: dict[Future[Any], Step[Any]] = field(default_factory=dict)
