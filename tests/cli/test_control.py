@@ -68,3 +68,13 @@ def test_a_setting_without_effect_is_refused(words, where, tmp_path, capsys):
     text = f"sainet: {name} is {value}; it must be left out unless {where}.\n"
     assert capsys.readouterr().err == text
     assert not out.exists()
+
+
+def test_the_lab_is_a_robot_and_no_world(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert called(["control", "--world", "lab", "--out", str(out)]) == 2
+    assert capsys.readouterr().err == (
+        "sainet: --world is lab; it must be planar or bullet; --robot selects the "
+        "virtual lab.\n"
+    )
+    assert not out.exists()

@@ -63,6 +63,8 @@ class RobotConfig:
     def __post_init__(self) -> None:
         """Check every setting."""
         require_one_of("robot", self.robot, ROBOTS)
+        wanted = "planar or bullet; `robot` selects the virtual lab"
+        require(self.world != "lab", "world", wanted, self.world)
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
         require_one_of("surface", self.surface, SURFACES)
         require_count("disks", self.disks, low=2, high=MOST_DISKS)
