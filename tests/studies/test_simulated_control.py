@@ -13,9 +13,10 @@ from sainet.models.identity import ModelId
 from sainet.report.arrange import arrange
 from sainet.report.writers import print_table, to_markdown
 from sainet.runs.documents import read_json
-from sainet.studies import simulated_control
+from sainet.studies import load_study, simulated_control
 from sainet.studies.paper_setup import IN, SAIN
 from sainet.studies.simulated_control import MODELS, PUBLISHED_SIMULATED_CONTROL, trials
+from sainet.studies.study import Scope
 
 
 def test_the_trials_include_those_of_the_paper():
@@ -26,6 +27,20 @@ def test_the_trials_include_those_of_the_paper():
     assert found["hard, tree, nominal properties"].given_properties == "assumed"
     assert all(config.disks == 2 for config in found.values())
     assert len({tuple(vars(config).items()) for config in found.values()}) == 5
+
+
+@pytest.mark.parametrize(
+    ("scale", "goals"), [("quick", {3: 1}), ("paper", {3: 50, 4: 10, 5: 10})]
+)
+def test_rows_are_longer_and_goals_begin_with_those_of_all_models(scale, goals):
+    scope = Scope(scale)
+    parts = load_study("control-long-rows").plan(scope).measured.parts
+    assert {part.config.disks: part.config.trials for part in parts} == goals
+    slugs = {tuple(model.id.slug for model in part.models) for part in parts}
+    assert slugs == {("physics-true", "sain-any")}
+    (three, *_), all_models = parts, load_study("control-any-number").plan(scope)
+    (before,) = (p for p in all_models.measured.parts if p.config.disks == 3)
+    assert replace(before.config, trials=three.config.trials) == three.config
 
 
 @pytest.mark.slow
