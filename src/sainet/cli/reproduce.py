@@ -36,12 +36,11 @@ class Reproduce:
     letter, letter-millimetres, letter-scaled-loss, letter-noise and
     letter-weak-damper; feedforward, varied-or-fixed and crossed-properties, at reduced
     size; simulated-control, control-any-number, control-long-rows, control-in-the-way
-    and adaptation, with shipped networks;
-    any-number and gaps; expected-cost; robot-planar; engine-parity; pretrained (the
-    shipped networks); fine-tuning (settings chosen on simulated pushes);
-    recorded-pushes, recorded-trust, recorded-chosen, recorded-ensembles,
-    recorded-few, recorded-active, recorded-data-efficiency and lab-realism, which need
-    --recorded; lab-collect,
+    and adaptation, with shipped networks; any-number and gaps; expected-cost;
+    robot-planar; engine-parity; pretrained (the shipped networks); fine-tuning
+    (settings chosen on simulated pushes); recorded-pushes, recorded-trust,
+    recorded-chosen, recorded-ensembles, recorded-few, recorded-active,
+    recorded-data-efficiency and lab-realism, which need --recorded; lab-collect,
     lab-prediction (Table IV), lab-control, lab-new-surface, lab-swapped-disks,
     lab-adaptation and lab-active, in virtual labs. Default: every study whose
     requirements are met."""

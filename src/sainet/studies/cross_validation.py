@@ -167,7 +167,7 @@ def cross_validated(
     return WithUnions(tuple(parts), tuple(unions))
 
 
-def divided(
+def in_folds(
     scope: Scope, store: Store, schemes: Sequence[Scheme], models: Sequence[Candidate]
 ) -> WithUnions:
     """Return the measurements of divisions into folds, at the quick scale of one."""

@@ -10,7 +10,7 @@ from itertools import product
 
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.studies.candidates import CANDIDATES, EnsembleCandidate, NetworkCandidate
-from sainet.studies.cross_validation import PHYSICS_IDENTIFIED, divided
+from sainet.studies.cross_validation import PHYSICS_IDENTIFIED, in_folds
 from sainet.studies.study import RECORDED, Plan, Scope, Study
 
 ONE, SEVERAL = NetworkCandidate("paper"), EnsembleCandidate("paper")
@@ -23,7 +23,9 @@ def _plan(scope: Scope) -> Plan:
     """Return all models in all folds; at the quick scale the networks without place."""
     chosen = NETWORKS if scope.scale == "paper" else NETWORKS[:2]
     models = (*(replace(each, scale=scope.scale) for each in chosen), PROCESS)
-    return Plan(divided(scope, scope.recorded_pushes(QUICK), ("kind", "place"), models))
+    return Plan(
+        in_folds(scope, scope.recorded_pushes(QUICK), ("kind", "place"), models)
+    )
 
 
 def _claims() -> Iterator[Claim]:

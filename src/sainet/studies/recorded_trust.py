@@ -30,8 +30,8 @@ from sainet.studies.cross_validation import (
     PHYSICS_IDENTIFIED,
     EvaluateFitted,
     WithUnions,
-    divided,
     fitted_and_tested,
+    in_folds,
 )
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Step
@@ -86,7 +86,7 @@ def _chosen(scope: Scope) -> Plan:
 
 def _within(scope: Scope, models: Sequence[ProcessCandidate]) -> WithUnions:
     """Return the measurements of all divisions into folds."""
-    return divided(scope, scope.recorded_pushes(), ("kind", *BLOCKED), models)
+    return in_folds(scope, scope.recorded_pushes(), ("kind", *BLOCKED), models)
 
 
 def _elsewhere(store: Store) -> Iterator[EvaluateFitted]:

@@ -120,7 +120,7 @@ class Scope:
         """Return the recorded pushes; at the quick scale a few of each group.
 
         Args:
-            quick: how many of each group; default: 40.
+            quick: how many of each group; default: `QUICK_RECORDED`.
 
         Raises:
             MissingInput: none were given.
