@@ -2,7 +2,7 @@
 
 import itertools
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import equinox as eqx
 import jax
@@ -19,11 +19,13 @@ from sainet.planning import PLANNERS, make_planner
 from sainet.planning import tree as tree_module
 from sainet.planning.checks import doubts_of_training
 from sainet.planning.greedy import GreedyPlanner
-from sainet.planning.levels import Level, Problem, judge, roll_pushes
+from sainet.planning.levels import Level, Problem, judge, predicted_ends, roll_pushes
 from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
 from sainet.scenes.pushes import PushGrid
+from sainet.scenes.scene import Scene
 from sainet.scenes.state import at_rest
+from sainet.tasks.push_to_goal import PushToGoal
 
 SCENE, STATE = scene(), touching()
 PHYSICS = PhysicsDynamics(make_engine("planar"))
@@ -236,6 +238,19 @@ def test_pushes_inside_a_disk_and_their_sequences_are_excluded():
     second = first.grow(np.arange(6), of_chain)
     assert not np.isfinite(second.cost[blocked[second.actions].any(axis=1)]).any()
     assert np.isfinite(second.cost).any()
+
+
+def test_a_plan_for_a_row_costs_its_distance_and_its_steering():
+    """The planner measures the steering with the engine that it plans with."""
+    disks = Scene.disks([1.0] * 3, [0.055] * 3)
+    state = disks.in_a_row()
+    task = PushToGoal(single([0.35, 0.06]), 2)
+    plan = GreedyPlanner(actions=FEW, horizon=1).plan(PHYSICS, task, disks, state)
+    seen = task.seen_from(partial(predicted_ends, PHYSICS, disks), disks, state, FEW)
+    end = single(plan.path[-1, :, :2])
+    effort = float(seen.steering.cost(end, task.goal - end[2]))
+    assert effort > 0
+    assert plan.cost == pytest.approx(plan.distance + effort, rel=1e-3)
 
 
 @every_planner

@@ -11,7 +11,7 @@ from planning.scenes import RADIUS, goal_ahead, scene, touching
 from sainet.runs.errors import BadScene
 from sainet.scenes.geometry import rotate
 from sainet.scenes.state import at_rest
-from sainet.tasks.push_to_goal import ALIGNMENT, PushToGoal, draw_goal
+from sainet.tasks.push_to_goal import draw_goal
 
 
 def naive_cost(task, state, weight):
@@ -83,35 +83,3 @@ def test_goals_follow_the_paper(kind, low, high):
     assert (angle > 0).mean() == pytest.approx(0.5, abs=0.12)
     np.testing.assert_array_equal(draw(7), draw(7))
     assert not np.allclose(draw(7), draw(7, seed=1))
-
-
-def naive_row_cost(task, state, weight):
-    """Angles instead of vectors: what disk k wants to do is mirrored at its link."""
-    place, goal = np.asarray(state.position, float), np.asarray(task.goal, float)
-    cost = np.linalg.norm(place[task.moved] - goal)
-    wanted = np.arctan2(*(goal - place[task.moved - 1])[::-1])
-    for disk in reversed(range(task.moved)):
-        link = np.arctan2(*(place[disk + 1] - place[disk])[::-1])
-        cost += 3 * weight * (1 - np.cos(wanted - link))
-        wanted = 2 * link - wanted
-    return cost
-
-
-@pytest.mark.parametrize("moved", [2, 3])
-def test_the_cost_of_a_row_mirrors_the_wanted_direction_at_each_link(moved):
-    rng = np.random.default_rng(moved)
-    turns = rng.uniform(-0.5, 0.5, moved)
-    ways = 0.11 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
-    place = np.concatenate([[[0.0, 0.0]], np.cumsum(ways, axis=0)]).astype(np.float32)
-    state = at_rest(jnp.asarray(place), jnp.zeros(moved + 1), jnp.zeros(2))
-    goal = jnp.asarray(place[-1] + [0.15, 0.05], jnp.float32)
-    task = PushToGoal(goal, moved)
-    wanted = naive_row_cost(task, state, ALIGNMENT)
-    assert float(task.cost(state)) == pytest.approx(wanted, rel=1e-5)
-    straight = at_rest(
-        jnp.asarray([[0.11 * k, 0.0] for k in range(moved + 1)]),
-        jnp.zeros(moved + 1),
-        jnp.zeros(2),
-    )
-    ahead = PushToGoal(jnp.array([0.11 * moved + 0.1, 0.0]), moved)
-    assert float(ahead.cost(straight)) == pytest.approx(0.1, abs=1e-5)

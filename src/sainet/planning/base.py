@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from sainet.models.dynamics import AbstractDynamics, check_purpose
 from sainet.models.library import Loadable, as_model
 from sainet.planning.checks import check_observation, doubts
-from sainet.planning.levels import Found, Problem, batch_of, roll_pushes
+from sainet.planning.levels import Found, Problem, batch_of, predicted_ends, roll_pushes
 from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
@@ -82,6 +82,8 @@ class AbstractPlanner(eqx.Module):
         disks = scene.body_count
         check_purpose(dynamics, kind, scene.time_step, disks)
         gap = check_observation(scene, state)
+        roll = partial(predicted_ends, dynamics.engine_alone or dynamics, scene)
+        task = task.seen_from(roll, scene, state, self.actions)
         problem = Problem(dynamics, task, scene, state, self.actions, self.expected)
         found = self.search(problem)
         pushes = tuple(

@@ -1,9 +1,9 @@
 """Outcomes of sequences of pushes, and the levels that a search selects from."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +23,9 @@ SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 
 _NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
 AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
+
+
+Judged = TypeVar("Judged")
 
 
 class Outcomes(NamedTuple):
@@ -59,13 +62,36 @@ def judge(
     Returns:
         The outcomes, ``[push]``, as NumPy arrays.
     """
-    shared = dynamics, task, scene
-    if dynamics.on_host:  # the engine uses every core itself
-        found = _judge(shared, *jax.tree.map(jnp.asarray, (states, pushes)))
+    function = _judge_expected if expected and not dynamics.on_host else _judge
+    return _of_pushes(function, (dynamics, task, scene), states, pushes, AT_ONCE)
+
+
+def predicted_ends(
+    dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
+) -> State:
+    """Return where one push from each state of one scene ends, on the host."""
+    return _of_pushes(_ends, (dynamics, scene), states, pushes)
+
+
+def _of_pushes(
+    function: Callable[..., Judged],
+    shared: tuple[Any, ...],
+    states: State,
+    pushes: Push,
+    most: int | None = None,
+) -> Judged:
+    """Return a function of one push from each state, as NumPy arrays."""
+    if shared[0].on_host:  # the engine uses every core itself
+        found = function(shared, *jax.tree.map(jnp.asarray, (states, pushes)))
     else:
-        function = _judge_expected if expected else _judge
-        found = over_devices(function, shared, states, pushes, most=AT_ONCE)
+        found = over_devices(function, shared, states, pushes, most=most)
     return jax.device_get(found)
+
+
+def _ends(shared: tuple[AbstractDynamics, Scene], states: State, pushes: Push) -> State:
+    dynamics, scene = shared
+    scenes = batch_of(scene, states.angle.shape[0])
+    return ends_of(dynamics, scenes, states, pushes)
 
 
 def roll_pushes(

@@ -4,6 +4,7 @@ Goals are random: easy goals ahead, hard goals aside.
 """
 
 from abc import abstractmethod
+from dataclasses import replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,9 +13,11 @@ from jaxtyping import Array, Bool, Float
 
 from sainet.runs.errors import BadScene
 from sainet.scenes.geometry import norm
+from sainet.scenes.pushes import PushGrid
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State
 from sainet.tasks import Goals
+from sainet.tasks.steering import Roll, Steering, steering_of
 
 
 class AbstractTask(eqx.Module):
@@ -32,10 +35,24 @@ class AbstractTask(eqx.Module):
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
         """Return whether the task is solved."""
 
+    def seen_from(
+        self, roll: Roll, scene: Scene, state: State, grid: PushGrid
+    ) -> "AbstractTask":
+        """Return the task with a cost for this decision, by default as it is.
+
+        Args:
+            roll: predicts where pushes end.
+            scene: one scene, without a batch axis.
+            state: observed, at rest.
+            grid: candidate pushes.
+        """
+        del roll, scene, state, grid
+        return self
+
 
 TOLERANCE_RADII = 0.1
 ALIGNMENT = 3.0
-_ROW = 3  # factor of w with three disks or more
+_ROW = 2  # least index of the target disk of a row
 
 
 class PushToGoal(AbstractTask):
@@ -45,22 +62,22 @@ class PushToGoal(AbstractTask):
     the angle at disk 1 between the goal and the target disk: this term keeps both disks
     and the goal on one line. (The paper adds a length and a number, w = 1.)
 
-    In a row of more disks, the angle at the last but one counts, and one for each disk
-    before it. To turn the target disk towards the goal, the disk behind it has to move
-    the other way: its wanted direction is mirrored at the line of the two, and so on to
-    disk 1. Rows buckle easily, so that w is three times as large.
+    In a row of more disks, the cost is ``|p_m - g|`` and the effort of steering that
+    the planner measured for this decision.
 
     Attributes:
         goal: of the target disk, [2] (m).
         moved: index of the target disk, from 0.
         tolerance: fraction of the radius of the target disk.
         alignment: w (m).
+        steering: of the row from disk 1 to the target disk; None with two disks.
     """
 
     goal: Float[Array, " 2"]
     moved: int = eqx.field(static=True, default=1)
     tolerance: float = eqx.field(static=True, default=TOLERANCE_RADII)
     alignment: float = eqx.field(static=True, default=ALIGNMENT)
+    steering: Steering | None = None
 
     def distance(self, state: State) -> Float[Array, "*batch"]:
         """Return the distance of the target disk from the goal (m).
@@ -71,17 +88,27 @@ class PushToGoal(AbstractTask):
         return norm(self._to_goal(self._moved(state)))
 
     def cost(self, state: State) -> Float[Array, "*batch"]:
-        """Return the paper's heuristic h(p_1, p_m, g) (m)."""
-        cost, place = self.distance(state), state.position
-        weight = self.alignment * (_ROW if self.moved > 1 else 1)
-        wanted = self._to_goal(place[..., max(self.moved - 1, 0), :])
-        for disk in reversed(range(max(self.moved, 1))):
-            ahead = place[..., min(disk + 1, self.moved), :] - place[..., disk, :]
-            lengths = jnp.maximum(norm(ahead) * norm(wanted), 1e-12)
-            cosine = jnp.sum(ahead * wanted, axis=-1) / lengths
-            cost += weight * (1 - cosine)
-            wanted = _mirrored(wanted, ahead)
-        return cost
+        """Return the paper's heuristic h(p_1, p_m, g), or that of a row (m)."""
+        distance, place = self.distance(state), state.position
+        if self.steering is not None:
+            row = place[..., : self.moved + 1, :]
+            return distance + self.steering.cost(row, self._to_goal(row[..., -1, :]))
+        first = place[..., 0, :]
+        ahead, wanted = self._moved(state) - first, self._to_goal(first)
+        lengths = jnp.maximum(norm(ahead) * norm(wanted), 1e-12)
+        cosine = jnp.sum(ahead * wanted, axis=-1) / lengths
+        return distance + self.alignment * (1 - cosine)
+
+    def seen_from(
+        self, roll: Roll, scene: Scene, state: State, grid: PushGrid
+    ) -> "PushToGoal":
+        """Return the task with the steering of its row, if there is one."""
+        self._moved(state)
+        if self.moved < _ROW:
+            return self
+        miss = self.tolerance * float(scene.radius[self.moved])
+        found = steering_of(roll, scene, state, grid, row=self.moved + 1, miss=miss)
+        return replace(self, steering=found)
 
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
         """Return whether the target disk is within the tolerance of the goal."""
@@ -98,15 +125,6 @@ class PushToGoal(AbstractTask):
 
     def _to_goal(self, place: Float[Array, "*batch 2"]) -> Float[Array, "*batch 2"]:
         return jnp.broadcast_to(self.goal, place.shape) - place
-
-
-def _mirrored(
-    vector: Float[Array, "*batch 2"], axis: Float[Array, "*batch 2"]
-) -> Float[Array, "*batch 2"]:
-    """Return vectors mirrored at lines along others."""
-    squared = jnp.maximum(jnp.sum(axis**2, axis=-1, keepdims=True), 1e-12)
-    along = jnp.sum(vector * axis, axis=-1, keepdims=True) / squared * axis
-    return 2 * along - vector
 
 
 # Angles from the axis through the disks, to either side (degrees).
