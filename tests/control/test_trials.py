@@ -26,7 +26,13 @@ from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
 from sainet.models.identity import ModelId
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs.documents import read_json, write_json
-from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+from sainet.runs.errors import (
+    BadCheckpoint,
+    BadInput,
+    BadSetting,
+    RunConflict,
+    UnknownName,
+)
 from sainet.runs.folders import CONFIG as CONFIG_FILE
 from sainet.runs.shards import Shard
 from sainet.scenes.recording import Recording
@@ -326,6 +332,14 @@ def test_a_network_for_other_controls_is_refused(tmp_path):
 def test_bad_settings_are_named(name, value):
     with pytest.raises(BadInput, match=f"^`{name}` is {value:g}"):
         ControlConfig(**{name: value})
+
+
+def test_the_weight_of_the_alignment_is_refused_for_a_row_that_is_steered():
+    with pytest.raises(
+        BadSetting, match="alignment.* unless the target disk is disk 2"
+    ):
+        ControlConfig(disks=3, alignment=5.0).check_used()
+    ControlConfig(disks=3, moved=2, alignment=5.0).check_used()
 
 
 def summarise(records):

@@ -71,8 +71,8 @@ class ControlConfig(RobotConfig):
     """Measured distance that ends an episode (fraction of the
     tolerance). The default leaves four standard deviations of measurement noise."""
     alignment: float = 3.0
-    """Weight of the cosine distance in the heuristic (m); three times as large with
-    three disks or more."""
+    """Weight of the cosine distance in the heuristic (m). A longer row, whose target
+    disk is behind disk 2, has no cosine distance: it is steered."""
     expected_cost: bool = False
     """Judge pushes by the mean cost over the predicted distribution of final positions,
     with a model that has regions (a Gaussian process or an ensemble)."""
@@ -137,6 +137,8 @@ class ControlConfig(RobotConfig):
         after = self.new_surface_after
         is_reached = after is None or after < self.pushes
         self._check_used("new_surface_after", is_reached, "it is below `pushes`")
+        is_second = self.target == 1
+        self._check_used("alignment", is_second, "the target disk is disk 2")
 
 
 _GAP_MM = (0.01, 100.0)

@@ -18,7 +18,7 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Join, Load
 from sainet.studies.study import Plan, Scope, Study
 
-GOALS = {3: 50, 4: 10, 5: 10}  # of each number of disks, at the scale paper
+GOALS = {3: 50, 4: 20, 5: 10}  # of each number of disks, at the scale paper
 MODELS = (physics()[1], Load(SAIN_ANY, "sain-any"))
 _LABEL = "{} disks, easy"
 
