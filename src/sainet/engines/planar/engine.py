@@ -81,9 +81,8 @@ class PlanarEngine(AbstractEngine):
         bodies = _drive(bodies, controls, control, scene.time_step)
         limits = _table_limits(scene, properties, bodies)
         step = solver.Step(scene.time_step, self.recovery, self.sweeps)
-        count = len(bodies.x)
-        every_pair = solver.contact_budget(count) == count * (count - 1) // 2
-        solve = solver.solve_all_pairs if every_pair else solver.solve_close_pairs
+        are_few = len(solver.every_pair(len(bodies.x))) <= solver.MOST_PAIRS
+        solve = solver.solve_all_pairs if are_few else solver.solve_close_pairs
         return _integrate(
             bodies, solve(bodies, properties, limits, step), scene.time_step
         )
