@@ -83,9 +83,8 @@ class PlanarEngine(AbstractEngine):
         step = solver.Step(scene.time_step, self.recovery, self.sweeps)
         are_few = len(solver.every_pair(len(bodies.x))) <= solver.MOST_PAIRS
         solve = solver.solve_all_pairs if are_few else solver.solve_close_pairs
-        return _integrate(
-            bodies, solve(bodies, properties, limits, step), scene.time_step
-        )
+        twists = solve(bodies, properties, limits, step)
+        return _integrate(bodies, twists, scene.time_step)
 
 
 def _drive(

@@ -133,9 +133,8 @@ class _Stacked(NamedTuple):
 
 def contact_budget(body_count: int) -> int:
     """Return the largest number of contacts between bodies, the pusher included."""
-    every = len(every_pair(body_count))
     # Two bodies have one contact, although the formula gives zero.
-    return min(every, max(3 * body_count - 6, 1))
+    return min(len(every_pair(body_count)), max(3 * body_count - 6, 1))
 
 
 def solve_close_pairs(
