@@ -18,7 +18,8 @@ from sainet.studies.simulated_control import RunTrials
 from sainet.studies.steps import Join, Load
 from sainet.studies.study import Plan, Scope, Study
 
-GOALS = {3: 50, 4: 20, 5: 10}  # of each number of disks, at the scale paper
+GOALS = 50  # of each number of disks, at the scale paper
+DISKS = (3, 4, 5)
 MODELS = (physics()[1], Load(SAIN_ANY, "sain-any"))
 _LABEL = "{} disks, easy"
 
@@ -26,15 +27,15 @@ _LABEL = "{} disks, easy"
 def _plan(scope: Scope) -> Plan:
     """Return the trials of three to five disks; at the quick scale of three."""
     most, pushes = TRIALS[scope.scale]
-    usual = ControlConfig(world="bullet", planner="tree", pushes=pushes)
-    rows = GOALS if scope.scale == "paper" else (min(GOALS),)
+    count = min(GOALS, most)
+    usual = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
     trials = (
         RunTrials(
             MODELS,
-            replace(usual, disks=disks, trials=min(GOALS[disks], most)),
+            replace(usual, disks=disks),
             Condition(label=_LABEL.format(disks), factors={"disks": disks}),
         )
-        for disks in rows
+        for disks in (DISKS if scope.scale == "paper" else DISKS[:1])
     )
     return Plan(Join(tuple(trials)))
 
@@ -47,6 +48,6 @@ STUDY = Study(
             f"with {disks} disks sain-any solves at least 90 % of easy goals",
             solves_share(SAIN_ANY.slug, 0.9, _LABEL.format(disks)),
         )
-        for disks in GOALS
+        for disks in DISKS
     ),
 )
