@@ -27,12 +27,11 @@ _LABEL = "{} disks, easy"
 def _plan(scope: Scope) -> Plan:
     """Return the trials of three to five disks; at the quick scale of three."""
     most, pushes = TRIALS[scope.scale]
-    count = min(GOALS, most)
-    usual = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
+    usual = ControlConfig(world="bullet", planner="tree", pushes=pushes)
     trials = (
         RunTrials(
             MODELS,
-            replace(usual, disks=disks),
+            replace(usual, disks=disks, trials=min(GOALS, most)),
             Condition(label=_LABEL.format(disks), factors={"disks": disks}),
         )
         for disks in (DISKS if scope.scale == "paper" else DISKS[:1])
