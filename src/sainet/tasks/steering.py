@@ -85,17 +85,17 @@ def steering_of(
     ends = np.asarray(roll(starts, _pushes(grid, turned[:, links:])).position, float)
     if not np.isfinite(ends).all():
         return None
-    moved = _rotated(ends - np.asarray(starts.position, float)[:, :1], -heading)
-    target = _rotated(ends - np.asarray(starts.position, float), -heading)[:, row - 1]
-    ways = np.diff(moved[:, :row], axis=1)
+    moved = (ends - np.asarray(starts.position, float))[:, links]
+    along, across = _rotated(moved, -heading).T
+    ways = _rotated(np.diff(ends[:, :row], axis=1), -heading)
     angles = np.arctan2(ways[..., 1], ways[..., 0])
-    after = np.concatenate([angles, target[:, 1:]], axis=1)
+    after = np.concatenate([angles, across[:, None]], axis=1)
     response = (after[:-1] - after[-1]).T / _TURN
     ranges = np.array([grid.contact_range, grid.direction_range])
     effort = _cost_to_go(response[:, :links], response[:, links:] * ranges, miss)
     return Steering(
         effort=jnp.asarray(effort, jnp.float32),
-        advance=jnp.asarray(max(target[-1, 0], _LEAST), jnp.float32),
+        advance=jnp.asarray(max(along[-1], _LEAST), jnp.float32),
         worth=jnp.asarray(grid.length, jnp.float32),
     )
 
