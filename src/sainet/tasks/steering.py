@@ -78,9 +78,8 @@ def steering_of(
         The steering; None where a prediction diverged.
     """
     links = row - 1
-    # One link is turned, or one angle of the push; nothing in the last case.
+    # In each push one link is turned, or one angle of the push; in the last, nothing.
     turned = _TURN * np.eye(links + 3, links + 2)
-    turned[-1] = 0
     starts, heading = _starts(scene, state, turned[:, :links])
     ends = np.asarray(roll(starts, _pushes(grid, turned[:, links:])).position, float)
     if not np.isfinite(ends).all():
