@@ -82,10 +82,10 @@ class Linear:
         return float(np.sum((whole @ best - target) ** 2))
 
 
-def measured(roll, count, state=None, grid=GRID, **scene):
+def measured(roll, count, state=None):
     state = row([0.0] * (count - 1)) if state is None else state
-    given = scene.get("scene", disks(len(state.angle)))
-    found = steering_of(roll, given, state, grid, row=count, miss=MISS)
+    given = disks(len(state.angle))
+    found = steering_of(roll, given, state, GRID, row=count, miss=MISS)
     assert found is not None
     return found
 
@@ -129,26 +129,25 @@ def test_the_cost_interpolates_between_numbers_of_pushes(pushes):
 ENGINE = PhysicsDynamics(make_engine("planar"))
 
 
-def by_engine(state, scene, count):
-    roll = partial(predicted_ends, ENGINE, scene)
-    return measured(roll, count, state, scene=scene)
+def by_engine(state, count):
+    roll = partial(predicted_ends, ENGINE, disks(len(state.angle)))
+    return measured(roll, count, state)
 
 
 def test_steering_depends_on_neither_place_nor_heading_nor_disks_beside_the_row():
-    scene = disks(3)
-    here = by_engine(row([0.0, 0.0]), scene, 3)
-    there = by_engine(row([0.0, 0.0], (0.3, -0.2), 2.0), scene, 3)
+    here = by_engine(row([0.0, 0.0]), 3)
+    there = by_engine(row([0.0, 0.0], (0.3, -0.2), 2.0), 3)
     np.testing.assert_allclose(there.effort, here.effort, rtol=0.02, atol=0.02)
     state = row([0.0, 0.0])
     place = np.concatenate([state.position, [[0.11, 0.113]]])
     beside = at_rest(place.tolist(), [0.0] * 4, [0.0, 0.0])
-    other = by_engine(beside, disks(4), 3)
+    other = by_engine(beside, 3)
     np.testing.assert_allclose(other.effort, here.effort, rtol=0.02, atol=0.02)
 
 
 def test_a_row_that_is_pushed_from_behind_is_unstable():
     """Without control its bends grow: a longer way costs more than it saves."""
-    found = by_engine(row([0.0, 0.0, 0.0]), disks(4), 4)
+    found = by_engine(row([0.0, 0.0, 0.0]), 4)
     bent = np.array([0.1, 0.0, 0.0])
     effort = np.einsum("i,kij,j->k", bent, np.asarray(found.effort, float), bent)
     assert effort[20] > 4 * effort[1]
@@ -163,6 +162,13 @@ def test_a_prediction_that_diverges_leaves_the_cost_of_two_disks():
     task = PushToGoal(jnp.array([0.4, 0.0]), 2)
     seen = task.seen_from(lost, disks(3), state, GRID)
     assert float(seen.cost(state)) == float(task.cost(state))
+
+
+def test_a_tolerance_of_zero_still_has_a_cost():
+    state = row([0.0, 0.1])
+    task = PushToGoal(jnp.array([0.4, 0.0]), 2, tolerance=0.0)
+    seen = task.seen_from(Linear(2), disks(3), state, GRID)
+    assert np.isfinite(float(seen.cost(state)))
 
 
 def test_two_disks_keep_the_heuristic_of_the_paper():

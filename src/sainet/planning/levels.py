@@ -23,9 +23,7 @@ SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
 
 _NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
 AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
-
-
-Judged = TypeVar("Judged")
+_Result = TypeVar("_Result")
 
 
 class Outcomes(NamedTuple):
@@ -69,18 +67,18 @@ def judge(
 def predicted_ends(
     dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
 ) -> State:
-    """Return where one push from each state of one scene ends, on the host."""
+    """Return where one push from each state of one scene ends, ``[push]``, at rest."""
     return _of_pushes(_ends, (dynamics, scene), states, pushes)
 
 
 def _of_pushes(
-    function: Callable[..., Judged],
+    function: Callable[..., _Result],
     shared: tuple[Any, ...],
     states: State,
     pushes: Push,
     most: int | None = None,
-) -> Judged:
-    """Return a function of one push from each state, as NumPy arrays."""
+) -> _Result:
+    """Return ``function(shared, states, pushes)`` as NumPy arrays, ``[push]``."""
     if shared[0].on_host:  # the engine uses every core itself
         found = function(shared, *jax.tree.map(jnp.asarray, (states, pushes)))
     else:

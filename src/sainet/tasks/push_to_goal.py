@@ -106,7 +106,7 @@ class PushToGoal(AbstractTask):
         self._moved(state)
         if self.moved < _ROW:
             return self
-        miss = self.tolerance * float(scene.radius[self.moved])
+        miss = max(self.tolerance, 1e-3) * float(scene.radius[self.moved])
         found = steering_of(roll, scene, state, grid, row=self.moved + 1, miss=miss)
         return replace(self, steering=found)
 
