@@ -264,6 +264,7 @@ ANY_NUMBER = (
     "studies/any_number",
     "studies/control_any_number",
     "tasks/obstacles",
+    "tasks/steering",
 )
 # The whole paper with one command: letter, feedforward networks, claims.
 WHOLE_PAPER = (
@@ -284,7 +285,6 @@ WHOLE_PAPER = (
     "studies/whole_report",
 )
 LETTER_LOSS = ("studies/letter_loss",)
-LONG_ROWS = ("studies/control_long_rows", "tasks/steering")
 MANY_MACHINES = (
     "evaluation/parts",
     "runs/executors",
@@ -341,7 +341,6 @@ LATER = ADDED + modules_of(
     + ANY_NUMBER
     + WHOLE_PAPER
     + LETTER_LOSS
-    + LONG_ROWS
     + MANY_MACHINES
 )
 REBUILT = [path for path in MODULES if path not in LATER]
@@ -451,8 +450,9 @@ COUNTS = {
     ),
     "code lines of any number of disks": (
         lambda: sum(map(code_lines, modules_of(ANY_NUMBER))),
-        715,
-        715,
+        # Two counts before, 715 and 130.
+        822,
+        822,
     ),
     "code lines of the whole paper": (
         lambda: sum(map(code_lines, modules_of(WHOLE_PAPER))),
@@ -463,11 +463,6 @@ COUNTS = {
         lambda: sum(map(code_lines, modules_of(LETTER_LOSS))),
         40,
         40,
-    ),
-    "code lines of longer rows in control": (
-        lambda: sum(map(code_lines, modules_of(LONG_ROWS))),
-        130,
-        130,
     ),
     "code lines of many machines": (
         lambda: sum(map(code_lines, modules_of(MANY_MACHINES))),

@@ -29,18 +29,23 @@ def test_the_trials_include_those_of_the_paper():
     assert len({tuple(vars(config).items()) for config in found.values()}) == 5
 
 
+ALL = ("physics", "physics-true", "sain", "sain-any")
+LONG = ("physics-true", "sain-any")
+
+
 @pytest.mark.parametrize(
-    ("scale", "goals"), [("quick", {3: 1}), ("paper", dict.fromkeys((3, 4, 5), 50))]
+    ("scale", "rows"),
+    [
+        ("quick", {2: (1, ALL), 3: (1, ALL)}),
+        ("paper", {2: (100, ALL), 3: (50, ALL), 4: (50, LONG), 5: (50, LONG)}),
+    ],
 )
-def test_rows_are_longer_and_goals_begin_with_those_of_all_models(scale, goals):
-    scope = Scope(scale)
-    parts = load_study("control-long-rows").plan(scope).measured.parts
-    assert {part.config.disks: part.config.trials for part in parts} == goals
-    slugs = {tuple(model.id.slug for model in part.models) for part in parts}
-    assert slugs == {("physics-true", "sain-any")}
-    (three, *_), all_models = parts, load_study("control-any-number").plan(scope)
-    (before,) = (p for p in all_models.measured.parts if p.config.disks == 3)
-    assert replace(before.config, trials=three.config.trials) == three.config
+def test_longer_rows_have_fewer_goals_and_the_longest_fewer_models(scale, rows):
+    parts = load_study("control-any-number").plan(Scope(scale)).measured.parts
+    assert {
+        part.config.disks: (part.config.trials, tuple(m.id.slug for m in part.models))
+        for part in parts
+    } == rows
 
 
 @pytest.mark.slow

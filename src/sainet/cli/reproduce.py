@@ -35,8 +35,8 @@ class Reproduce:
     regularisation and robustness, with the networks of Table III; published-physics,
     letter, letter-millimetres, letter-scaled-loss, letter-noise and
     letter-weak-damper; feedforward, varied-or-fixed and crossed-properties, at reduced
-    size; simulated-control, control-any-number, control-long-rows, control-in-the-way
-    and adaptation, with shipped networks; any-number and gaps; expected-cost;
+    size; simulated-control, control-any-number, control-in-the-way and adaptation,
+    with shipped networks; any-number and gaps; expected-cost;
     robot-planar; engine-parity; pretrained (the shipped networks); fine-tuning
     (settings chosen on simulated pushes); recorded-pushes, recorded-trust,
     recorded-chosen, recorded-ensembles, recorded-few, recorded-active,

@@ -48,7 +48,6 @@ STUDIES = {
     "robustness": "sainet.studies.robustness:STUDY",
     "simulated-control": "sainet.studies.simulated_control:STUDY",
     "control-any-number": "sainet.studies.control_any_number:STUDY",
-    "control-long-rows": "sainet.studies.control_long_rows:STUDY",
     "control-in-the-way": "sainet.studies.control_any_number:IN_THE_WAY",
     "adaptation": "sainet.studies.adaptation:STUDY",
     "lab-adaptation": "sainet.studies.adaptation:NEW_SURFACE_STUDY",
