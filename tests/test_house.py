@@ -294,6 +294,8 @@ MANY_MACHINES = (
 )
 ENGINEER = (
     "cli/inspect",
+    # With lines that stood in datasets/splits.py before.
+    "datasets/chains",
     "datasets/doubts",
     "datasets/facts",
     "datasets/inspection",
@@ -382,7 +384,7 @@ COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
         lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
-        15_338,
+        15_320,
         11_000,
     ),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),

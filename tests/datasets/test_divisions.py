@@ -7,8 +7,8 @@ import pytest
 
 from learning.stores import info_of, made_up, write
 from sainet.datasets import Scheme
+from sainet.datasets.chains import linked
 from sainet.datasets.folds import BLOCKED, folds_by
-from sainet.datasets.splits import linked
 from sainet.runs.errors import BadStore
 
 PUSHES, FOLDS = 40, 4

@@ -11,11 +11,11 @@ from msgspec import structs
 from datasets.stores import contents, small
 from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.cli.entry import run
+from sainet.datasets.chains import linked
 from sainet.datasets.doubts import find_doubts
 from sainet.datasets.facts import facts_of
 from sainet.datasets.generate import generate
 from sainet.datasets.inspection import inspect, starts_where_another_ends
-from sainet.datasets.splits import linked
 from sainet.datasets.store import Store, open_store
 
 PUSHES, STEPS = 12, 40

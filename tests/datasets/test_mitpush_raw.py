@@ -113,7 +113,10 @@ def test_the_store_is_evaluated_like_any_other(imported):
 
 def test_repeats_share_a_number(tmp_path: Path):
     plans = [{"rep": 0}, {"t": 0.349}, {"rep": 1}, {"v": 60}]
-    files = {name(**plan): to_json(recording(0.2)) for plan in plans}
+    files = {
+        name(**plan): to_json(recording(0.2 + 0.01 * number))
+        for number, plan in enumerate(plans)
+    }
     store = import_mitpush(pack(tmp_path / "a.zip", files), tmp_path / "out")
     assert Counter(Counter(store.repeats().tolist()).values()) == {3: 1, 1: 1}
 

@@ -12,9 +12,9 @@ import pytest
 from datasets.stores import assert_same_files
 from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.cli.entry import run
+from sainet.datasets.chains import linked
 from sainet.datasets.splits import (
     fold_of_push,
-    linked,
     split,
     split_rows,
     write_split,
@@ -38,6 +38,24 @@ def test_parts_share_no_push_and_no_repeat(store, test, tested):
     assert (train.info.pushes, tests.info.pushes) == (30 - tested, tested)
     assert sorted((*train.rows, *tests.rows)) == list(range(30))
     assert not set(train.repeats()) & set(tests.repeats())
+
+
+def test_a_push_that_is_stored_twice_stays_in_one_part(store):
+    twice = store.take([0, 9, 27, 9, 0])
+    for seed in range(20):
+        train, tests = split(twice, 0.4, seed)
+        assert not set(train.push_hashes()) & set(tests.push_hashes())
+
+
+def test_copies_make_repeats_of_what_they_are_repeats_of(tmp_path):
+    info = info_of(6, has_repeats=True)
+    arrays = made_up(info)
+    copied = {
+        name: np.asarray(each)[[0, 1, 2, 3, 0, 5]] for name, each in arrays.items()
+    }
+    kinds = np.array([7, 7, 2, 4, 4, 1])  # push 4, a copy of push 0, is a repeat of 3
+    store = write(tmp_path / "data", info, copied | {"repeat": kinds})
+    assert store.repeats().tolist() == [7, 7, 2, 7, 7, 1]
 
 
 def test_a_seed_determines_the_parts(store):

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import msgspec
 import numpy as np
-from jaxtyping import Bool, Int, UInt64
+from jaxtyping import Bool
 
 from sainet.datasets.facts import Facts
 from sainet.datasets.store import Store
@@ -69,7 +69,7 @@ def find_doubts(store: Store, facts: Facts) -> list[Doubt]:
 
 def _rules(store: Store, facts: Facts) -> Iterator[_Rule]:
     """Yield each reason, whether it holds for each push, and the values of its text."""
-    first = _first_of_equal(store.push_hashes())
+    first = store.first_alike()
     yield "duplicate", first < np.arange(len(first)), (first,)
     unknown, unseen = facts.known_steps == 0, facts.unseen
     yield "no known pose", unknown, ()
@@ -108,11 +108,3 @@ def _of_motion(facts: Facts) -> Iterator[_Rule]:
     driven = moved * (2 * facts.moved.shape[1] - 1)  # disks drive disks
     values = 1e3 * rim, 1e3 * (facts.path_length + moved)
     yield "turned too far", rim > most + driven + SLACK, values
-
-
-def _first_of_equal(
-    hashes: UInt64[np.ndarray, " push"],
-) -> Int[np.ndarray, " push"]:
-    """Return the first push with the hash of each push."""
-    _, first, place = np.unique(hashes, return_index=True, return_inverse=True)
-    return first[place]

@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sainet.datasets.schema import Arrays, StoreInfo
-from sainet.datasets.splits import last_known
-from sainet.datasets.store import Store
+from sainet.datasets.store import Store, last_known
 from sainet.scenes.quantities import PROPERTIES
 
 PATH_POINTS = 9  # of the pusher's path

@@ -11,8 +11,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sainet.datasets import Scheme
+from sainet.datasets.chains import linked
 from sainet.datasets.schema import Arrays
-from sainet.datasets.splits import fold_of_push, linked
+from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
 from sainet.runs.errors import BadStore
 

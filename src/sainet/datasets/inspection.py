@@ -6,13 +6,10 @@ import msgspec
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sainet.datasets.chains import continuations
 from sainet.datasets.doubts import Doubt, find_doubts
 from sainet.datasets.facts import Facts
 from sainet.datasets.store import Store
-
-_SAME_PLACE = 3e-4  # m, of all disks, as in `splits.linked`
-_SAME_ANGLE = np.deg2rad(1.0)  # rad
-_NEIGHBOURS = 8  # ends that are compared with a start
 
 
 class Range(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,32 +96,6 @@ def _ranges(facts: Facts) -> Iterator[Range]:
 
 
 def starts_where_another_ends(facts: Facts) -> Bool[np.ndarray, " push"]:
-    """Return whether each push starts where another one ended.
-
-    All disks are within 0.3 mm and one degree, as in `splits.linked`. Of the known ends
-    the eight nearest are compared.
-    """
-    from scipy.spatial import KDTree
-
-    rows = np.flatnonzero(np.isfinite(facts.end).all(axis=(1, 2)))
-    found = np.zeros(len(facts.start), bool)
-    if not len(rows):
-        return found
-    count = min(_NEIGHBOURS, len(rows))
-    tree = KDTree(_places(facts.end[rows]))
-    near = np.asarray(tree.query(_places(facts.start), k=count)[1])
-    for neighbour in near.reshape(-1, count).T:
-        other = rows[neighbour]
-        apart = facts.start - facts.end[other]
-        far = np.hypot(apart[..., 0], apart[..., 1]).max(axis=1)
-        turned = np.abs(np.mod(apart[..., 2] + np.pi, 2 * np.pi) - np.pi).max(axis=1)
-        is_near = (far <= _SAME_PLACE) & (turned <= _SAME_ANGLE)
-        found |= is_near & (other != np.arange(len(found)))
-    return found
-
-
-def _places(pose: Float[np.ndarray, "push body 3"]) -> Float[np.ndarray, "push column"]:
-    """Return points that are near each other if all poses are."""
-    rim = _SAME_PLACE / _SAME_ANGLE * np.exp(1j * pose[..., 2])
-    columns = [pose[..., 0], pose[..., 1], rim.real, rim.imag]
-    return np.concatenate(columns, axis=1)
+    """Return whether each push starts where another one ended."""
+    ended, started = continuations(facts.start, facts.end)
+    return np.isin(np.arange(len(facts.start)), started[started != ended])

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Int
 
+from sainet.datasets.chains import linked
 from sainet.datasets.store import Store
 from sainet.datasets.writer import write_once
 from sainet.runs.errors import BadInput, RunConflict, require
@@ -16,9 +17,6 @@ from sainet.runs.manifest import MANIFEST
 from sainet.scenes.quantities import require_count
 
 _SPLIT_STREAM, _FOLD_STREAM = 0x5B117, 0xF01D
-_SAME_PLACE = 3e-4  # m
-_SAME_ANGLE = np.deg2rad(1.0)  # rad
-_BLOCK = 256  # pushes compared with all others at a time
 
 
 @dataclass(frozen=True)
@@ -40,7 +38,7 @@ def split(
         store: at least two pushes that are not repeats of each other.
         test: share of the test pushes, met as nearly as repeats allow.
         seed: of the draw.
-        chains: keep recorded chains together as well (see `linked`).
+        chains: keep recorded chains together as well (see `datasets.chains`).
 
     Raises:
         BadInput: all pushes belong together, so that one part would be empty.
@@ -127,49 +125,6 @@ def fold_of_push(
     return order[kind] % count
 
 
-def linked(store: Store) -> Int[np.ndarray, " push"]:
-    """Return a number for each push: repeats and pushes of one chain share it.
-
-    In a chain a push starts where another one ended: all disks within 0.3 mm and one
-    degree. A model of places may interpolate along chains.
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    names = ("initial", "truth", "pose_observed")
-    arrays = store.read(slice(None), names)
-    before = arrays["initial"][..., :3]
-    after = last_known(arrays["truth"][..., :3], arrays["pose_observed"] > 0)
-    count = store.info.pushes
-    _, first = np.unique(store.repeats(), return_inverse=True)
-    ones, others = [np.arange(count)], [count + first]  # a node for each set of repeats
-    for start in range(0, count, _BLOCK):
-        row, column = np.nonzero(_is_same(after[start : start + _BLOCK], before))
-        ones.append(start + row)
-        others.append(column)
-    edges = np.concatenate(ones), np.concatenate(others)
-    graph = coo_array((np.ones(len(edges[0])), edges), shape=(2 * count, 2 * count))
-    return connected_components(graph, directed=False)[1][:count]
-
-
-def last_known(
-    values: Float[np.ndarray, "push time *rest"], known: Bool[np.ndarray, "push time"]
-) -> Float[np.ndarray, "push *rest"]:
-    """Return the last known values of each push; NaN where none is known."""
-    last = known.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
-    is_known = known.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
-    return np.where(is_known, values[np.arange(len(values)), last], np.nan)
-
-
-def _is_same(
-    poses: Float[np.ndarray, "one body 3"], others: Float[np.ndarray, "other body 3"]
-) -> Bool[np.ndarray, "one other"]:
-    apart = poses[:, None] - others[None]
-    near = np.hypot(apart[..., 0], apart[..., 1]) <= _SAME_PLACE
-    turned = np.abs(np.mod(apart[..., 2] + np.pi, 2 * np.pi) - np.pi)
-    return (near & (turned <= _SAME_ANGLE)).all(axis=-1)
-
-
 def write_split(
     store: Store, out: Path, *, test: float = 0.2, seed: int = 0, chains: bool = False
 ) -> tuple[Store, Store]:
@@ -180,7 +135,7 @@ def write_split(
         out: folder of the two run folders, `train` and `test`; interrupted ones resume.
         test: share of the test pushes, above 0 and below 1.
         seed: of the draw, 0 or more.
-        chains: keep recorded chains together as well (see `linked`).
+        chains: keep recorded chains together as well (see `datasets.chains`).
 
     Raises:
         BadSetting: a setting is out of its range.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int, UInt64
+from jaxtyping import Bool, Float, Int, UInt64
 from msgspec import structs
 
 from sainet.datasets import schema
@@ -83,11 +83,22 @@ class Store:
     def repeats(self) -> Int[np.ndarray, " push"]:
         """Return a number for each push; repeats of one push share their number.
 
-        In stores without this information, no two pushes are repeats.
+        Pushes that are alike are repeats as well: one push that is stored twice.
         """
-        if not self.info.has_repeats:
-            return np.arange(self.info.pushes)
-        return self.read(slice(None), ("repeat",))["repeat"]
+        first = self.first_alike()
+        kinds = np.arange(len(first))
+        if self.info.has_repeats:
+            kinds = self.read(slice(None), ("repeat",))["repeat"]
+        for row in np.flatnonzero(first < np.arange(len(first))):
+            kinds = np.where(kinds == kinds[row], kinds[first[row]], kinds)
+        return kinds
+
+    def first_alike(self) -> Int[np.ndarray, " push"]:
+        """Return the first push that starts and is commanded as each push."""
+        _, first, place = np.unique(
+            self.push_hashes(), return_index=True, return_inverse=True
+        )
+        return first[place]
 
     @cached_property
     def _group(self) -> Any:  # noqa: ANN401
@@ -157,6 +168,15 @@ class Store:
             return whole
         chosen = len(self.rows) if self._is_prefix else self.rows
         return content_hash(f"{whole} {chosen}".encode())
+
+
+def last_known(
+    values: Float[np.ndarray, "push time *rest"], known: Bool[np.ndarray, "push time"]
+) -> Float[np.ndarray, "push *rest"]:
+    """Return the last known values of each push; NaN where none is known."""
+    last = known.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
+    is_known = known.any(axis=1).reshape(-1, *[1] * (values.ndim - 2))
+    return np.where(is_known, values[np.arange(len(values)), last], np.nan)
 
 
 def _indices(rows: Iterable[int] | np.ndarray) -> list[int]:

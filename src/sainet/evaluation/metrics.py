@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sainet.datasets.splits import last_known
+from sainet.datasets.store import last_known
 from sainet.evaluation.intervals import Folds, Interval, Sample
 from sainet.runs.errors import Diverged
 

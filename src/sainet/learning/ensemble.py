@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from sainet.datasets.batch import PushBatch, to_batch
-from sainet.datasets.splits import last_known, split_rows
-from sainet.datasets.store import Store
+from sainet.datasets.splits import split_rows
+from sainet.datasets.store import Store, last_known
 from sainet.engines.devices import is_one_gpu
 from sainet.engines.simulator import InternalEngine
 from sainet.learning.fit import complete

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sainet.control.config import CollectConfig
-from sainet.datasets.splits import last_known, split_rows
-from sainet.datasets.store import Store
+from sainet.datasets.splits import split_rows
+from sainet.datasets.store import Store, last_known
 from sainet.evaluation.intervals import RESAMPLES, Estimate
 from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import (
