@@ -30,7 +30,7 @@ def test_the_trials_include_those_of_the_paper():
 
 
 ALL = ("physics", "physics-true", "sain", "sain-any")
-LONG = ("physics-true", "sain-any")
+LONG = ("physics", "physics-true", "sain-any")
 
 
 @pytest.mark.parametrize(
