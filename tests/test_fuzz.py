@@ -21,7 +21,7 @@ import sys
 import fuzz
 from sainet.datasets import store
 store.check_values = lambda *arguments: None
-counts = fuzz.run(range(0, 200, len(fuzz.TARGETS)), 0)
+counts = fuzz.run(range(0, 300, len(fuzz.TARGETS)), 0)
 sys.exit(not any(how == "IMPOSSIBLE" for _, how in counts))
 """
     command = [sys.executable, "-c", script]
