@@ -42,10 +42,14 @@ LONG = ("physics", "physics-true", "sain-any")
 )
 def test_longer_rows_have_fewer_goals_and_the_longest_fewer_models(scale, rows):
     parts = load_study("control-any-number").plan(Scope(scale)).measured.parts
+    usual = (part for part in parts if not part.config.adapt)
     assert {
         part.config.disks: (part.config.trials, tuple(m.id.slug for m in part.models))
-        for part in parts
+        for part in usual
     } == rows
+    adapted = [part for part in parts if part.config.adapt]
+    assert [part.config.disks for part in adapted] == [n for n in rows if n > 3]
+    assert {m.id.slug for part in adapted for m in part.models} <= {"physics"}
 
 
 @pytest.mark.slow

@@ -40,12 +40,14 @@ def _rows(scope: Scope) -> Plan:
     two = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
     hard = replace(two, goals="hard")
     few = replace(two, trials=max(count // 2, 1))
-    longer = tuple(
-        _trials(easy(disks), replace(few, disks=disks), IN_LONG_ROWS)
-        for disks in (LONG if scope.scale == "paper" else ())
-    )
-    three = _trials(easy(3), replace(few, disks=3))
-    return Plan(Join((_trials(easy(2), two), _trials(HARD, hard), three, *longer)))
+    parts = [_trials(easy(2), two), _trials(HARD, hard)]
+    parts += [_trials(easy(3), replace(few, disks=3))]
+    for disks in LONG if scope.scale == "paper" else ():
+        longer = replace(few, disks=disks)
+        parts += [_trials(easy(disks), longer, IN_LONG_ROWS)]
+        adapted = replace(longer, adapt=True)
+        parts += [_trials(f"{easy(disks)}, adapted", adapted, physics()[:1])]
+    return Plan(Join(tuple(parts)))
 
 
 def _in_the_way(scope: Scope) -> Plan:
