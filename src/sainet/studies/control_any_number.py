@@ -24,8 +24,7 @@ MODELS = (*physics(), Load(SAIN, "sain"), _ANY)
 LONG = (4, 5)  # disks of the longest rows
 IN_LONG_ROWS = (*physics(), _ANY)
 _FACTORS = ("goals", "disks", "obstacles")
-HARD = "2 disks, hard"
-SECOND = "second of 3 disks, easy"
+HARD, SECOND = "2 disks, hard", "second of 3 disks, easy"
 BLOCKED = "2 disks and 2 obstacles, hard"
 
 
@@ -38,14 +37,13 @@ def _rows(scope: Scope) -> Plan:
     """Return the trials of rows; more than two disks have half as many goals."""
     count, pushes = TRIALS[scope.scale]
     two = ControlConfig(world="bullet", planner="tree", trials=count, pushes=pushes)
-    hard = replace(two, goals="hard")
-    few = replace(two, trials=max(count // 2, 1))
-    parts = [_trials(easy(2), two), _trials(HARD, hard)]
-    parts += [_trials(easy(3), replace(few, disks=3))]
+    few, hard = replace(two, trials=max(count // 2, 1)), replace(two, goals="hard")
+    three = _trials(easy(3), replace(few, disks=3))
+    parts = [_trials(easy(2), two), _trials(HARD, hard), three]
     for disks in LONG if scope.scale == "paper" else ():
-        longer = replace(few, disks=disks)
-        parts += [_trials(easy(disks), longer, IN_LONG_ROWS)]
-        adapted = replace(longer, adapt=True)
+        usual = replace(few, disks=disks)
+        adapted = replace(usual, adapt=True)
+        parts += [_trials(easy(disks), usual, IN_LONG_ROWS)]
         parts += [_trials(f"{easy(disks)}, adapted", adapted, physics()[:1])]
     return Plan(Join(tuple(parts)))
 
@@ -56,9 +54,9 @@ def _in_the_way(scope: Scope) -> Plan:
     few = ControlConfig(
         world="bullet", planner="tree", trials=max(count // 4, 1), pushes=pushes
     )
-    second = replace(few, disks=3, moved=2)
+    second = _trials(SECOND, replace(few, disks=3, moved=2))
     blocked = replace(few, disks=4, obstacles=2, goals="hard")
-    return Plan(Join((_trials(SECOND, second), _trials(BLOCKED, blocked))))
+    return Plan(Join((second, _trials(BLOCKED, blocked))))
 
 
 def _trials(
