@@ -30,9 +30,9 @@ def verdicts_on(summary: Summary) -> tuple[str, ...]:
     labels = labels_of(summary.models)
     conditions = [condition.label for condition in summary.conditions]
     if summary.is_of_trials:
-        if not summary.tests:
+        if not (tested := {test.condition for test in summary.tests}):
             return ()
-        found = [rank_models(summary, condition) for condition in conditions]
+        found = [rank_models(summary, each) for each in conditions if each in tested]
         level = [each.condition or "here" for each in found if not each.better]
         apart = [each for each in found if each.better]
         return (_worded("solved", labels=labels, level=level, apart=apart),)
