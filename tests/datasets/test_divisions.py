@@ -64,6 +64,19 @@ def test_repeats_and_chains_stay_together(tmp_path):
         assert set(owner) == set(range(FOLDS))
 
 
+@pytest.mark.parametrize("scheme", get_args(Scheme))
+def test_copies_stay_together(tmp_path, scheme):
+    """Of a push that was stored first and last, no model is tested on the copy."""
+    info, arrays, _ = spread()
+    first = np.append(EVERY[:-1], 0)
+    repeats = np.arange(PUSHES)
+    copied = {name: np.asarray(each)[first] for name, each in arrays.items()}
+    store = write(tmp_path / "data", info, copied | {"repeat": repeats})
+    owner = folds_by(store, scheme, FOLDS, EVERY)
+    assert owner[0] == owner[-1]
+    assert set(owner) == set(range(FOLDS))
+
+
 def test_a_part_has_the_kinds_of_the_whole_and_blocks_of_its_own(spread_out):
     store, _ = spread_out
     rows = np.arange(5, 35)

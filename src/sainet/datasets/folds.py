@@ -23,7 +23,7 @@ BLOCKED: tuple[Scheme, ...] = ("place", "direction", "side", "order")
 def folds_by(
     store: Store, scheme: Scheme, count: int, rows: Int[np.ndarray, " some"]
 ) -> Int[np.ndarray, " some"]:
-    """Return the fold of some pushes, from 0.
+    """Return the fold of some pushes, from 0; copies of one push share their fold.
 
     Args:
         store: of all pushes; repeats and chains are looked for in all of them.
@@ -39,7 +39,7 @@ def folds_by(
         owner, parts = fold_of_push(kinds, count)[rows], len(np.unique(kinds[rows]))
     else:
         part = store.take(rows)
-        owner = _blocks(_values(part, scheme), count)
+        owner = _blocks(_values(part, scheme), count)[part.first_alike()]
         parts = part.info.pushes
     if len(np.unique(owner)) < count:
         raise BadStore(
