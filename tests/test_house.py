@@ -384,7 +384,7 @@ COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
         lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
-        15_320,
+        15_279,
         11_000,
     ),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),
@@ -427,8 +427,9 @@ COUNTS = {
     ),
     "code lines of choosing pushes": (
         lambda: sum(map(code_lines, modules_of(CHOOSING))),
-        400,
-        400,
+        # With lines that stood in studies/data_efficiency.py before.
+        407,
+        407,
     ),
     "code lines of expected costs": (
         lambda: sum(map(code_lines, modules_of(EXPECTED_COST))),

@@ -1,14 +1,18 @@
 """Studies of few recorded pushes, tiny and on made-up ones."""
 
 from importlib.util import find_spec
+from itertools import product
 
 import numpy as np
 import pytest
 
 from learning.stores import end_points_alone, info_of, made_up, write
+from models.samples import identified_folder
 from sainet.evaluation.joining import join
 from sainet.evaluation.measurements import Header, Measurements, measurements_of
 from sainet.evaluation.metrics import MEASURED
+from sainet.learning.recipes import FromModel, FromSimulator
+from sainet.models.card import read_card
 from sainet.studies import active_choice, load_study, recorded_few
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
 from sainet.studies.data_efficiency import of_pushes
@@ -95,11 +99,12 @@ def test_networks_and_ensembles_share_their_folds(tmp_path, scale, schemes, iter
             *networks, process = (each.candidate for each in fold.fitted)
             assert process.identity.slug == "gp-identified-place"
             features = ("paper", "place") if scale == "paper" else ("paper",)
-            assert [(n.features, n.identity.variant) for n in networks] == [
+            assert [(n.variant.features, n.identity.variant) for n in networks] == [
                 (name, variant) for name in features for variant in ("", "ensemble")
             ]
             pushes = fold.engine.pushes.store
-            trained = {n._recipe(pushes).optimiser.iterations for n in networks}
+            recipes = [n.recipe(pushes.info.pushes) for n in networks]
+            trained = {recipe.optimiser.iterations for recipe in recipes}
             assert trained == {iterations}
 
 
@@ -129,6 +134,40 @@ def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
     assert all(one < other for one, other in zip(fewer, more, strict=True))
     tests = [set(step.pushes.store.rows) for step in parts[0].parts]
     assert not any(rows & held for rows, held in zip(more, tests, strict=True))
+    alone, around_assumed, around_identified, *_ = parts[0].parts[0].fitted
+    assert [each.name for each in parts[0].parts[0].fitted] == [
+        "in-tuned",
+        "sain-tuned",
+        "sain-identified-residual",
+        "gp-identified-side",
+        "gp-identified-place",
+    ]
+    assert alone.candidate.recipe(10).start == FromModel("in-stroke")
+    assert around_assumed.candidate.recipe(10).start == FromModel("sain-stroke")
+    assert around_identified.candidate.recipe(10).start == FromSimulator()
+
+
+@pytest.mark.slow
+def test_networks_of_few_pushes_are_made_around_the_engine_that_they_name(
+    make, recorded, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(recorded_few, "COUNTS", {"quick": (10, 12)})
+    monkeypatch.setattr(recorded_few, "NETWORKS", recorded_few.NETWORKS[1:])
+    monkeypatch.setattr(recorded_few, "PROCESSES", ())
+    # Of one size, so that everything compiles once.
+    small = lambda recipe, *_: recipe.changed(iterations=1, batch_size=4)  # noqa: E731
+    monkeypatch.setattr("sainet.studies.recorded_models.scaled", small)
+    found = lambda store, folder: identified_folder(folder, pusher_friction=0.3)  # noqa: E731
+    monkeypatch.setattr("sainet.studies.cross_validation.identify_into", found)
+    table = make("recorded-few", recorded)
+    rows = [(row["group"], row["model"]) for row in table["rows"]]
+    models = ("physics", "physics-identified", "sain-tuned", "sain-identified-residual")
+    assert sorted(rows) == sorted(product(("10", "12"), models))
+    assert (tmp_path / "recorded-few" / "recorded-few.svg").is_file()
+    cards = [read_card(path.parent) for path in (tmp_path / STEPS).rglob("card.json")]
+    assert {card.internal.simulator.is_identified for card in cards} == {True, False}
+    for card in cards:
+        assert card.internal.simulator.is_identified == (card.started_from is None)
 
 
 def test_the_saving_is_where_the_curves_meet():

@@ -12,7 +12,7 @@ from sainet.learning.recipes import FROM_ENGINE
 from sainet.models.card import read_card, read_identified
 from sainet.models.library import load_model
 from sainet.runs.errors import BadInput
-from sainet.studies import data_efficiency, fine_tuning, load_study, recorded_pushes
+from sainet.studies import fine_tuning, load_study, recorded_pushes
 from sainet.studies.fine_tuning import Way
 from sainet.studies.recorded_models import TunedModels, Variant, surfaces_of
 from sainet.studies.runner import Runner
@@ -56,8 +56,6 @@ def tuned(make, recorded, monkeypatch):
     monkeypatch.setattr(recorded_pushes, "VARIANTS", FEW)
     monkeypatch.setattr(recorded_pushes, "FOR_ALL", FEW[1:2])
     monkeypatch.setattr(recorded_pushes, "ELSEWHERE", FEW[:2])
-    monkeypatch.setattr(data_efficiency, "VARIANTS", FEW[1:2])
-    monkeypatch.setattr(data_efficiency, "RECORDED_COUNTS", {"quick": (3, 5)})
     # Of one size, so that everything compiles once.
     small = lambda recipe, *_: recipe.changed(iterations=1, batch_size=4)  # noqa: E731
     monkeypatch.setattr("sainet.studies.recorded_models.scaled", small)
@@ -72,7 +70,7 @@ def test_surfaces_are_groups_without_their_speed(recorded):
 
 
 def test_without_recorded_pushes_there_is_no_table():
-    for name in ("recorded-pushes", "recorded-data-efficiency"):
+    for name in ("recorded-pushes", "recorded-few"):
         with pytest.raises(BadInput, match="`recorded` is missing"):
             load_study(name).check(Scope("quick"))
 
@@ -167,13 +165,3 @@ def test_settings_of_tuning_are_compared_over_robots(make, monkeypatch, tmp_path
         for path in (tmp_path / STEPS).rglob("card.json")
     }
     assert decided == {1 / 20, 1 / 10}  # one over the pushes
-
-
-@pytest.mark.slow
-def test_larger_training_sets_contain_the_smaller_sets(tuned, tmp_path):
-    table = tuned("recorded-data-efficiency")
-    groups = {row["group"] for row in table["rows"]}
-    assert groups == {"3", "5"}
-    assert {row["n"] for row in table["rows"]} == {24}
-    folder = tmp_path / "recorded-data-efficiency"
-    assert (folder / "recorded-data-efficiency.svg").is_file()

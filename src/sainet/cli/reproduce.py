@@ -39,11 +39,10 @@ class Reproduce:
     with shipped networks; any-number and gaps; expected-cost;
     robot-planar; engine-parity; pretrained (the shipped networks); fine-tuning
     (settings chosen on simulated pushes); recorded-pushes, recorded-trust,
-    recorded-chosen, recorded-ensembles, recorded-few, recorded-active,
-    recorded-data-efficiency and lab-realism, which need --recorded; lab-collect,
-    lab-prediction (Table IV), lab-control, lab-new-surface, lab-swapped-disks,
-    lab-adaptation and lab-active, in virtual labs. Default: every study whose
-    requirements are met."""
+    recorded-chosen, recorded-ensembles, recorded-few, recorded-active and
+    lab-realism, which need --recorded; lab-collect, lab-prediction (Table IV),
+    lab-control, lab-new-surface, lab-swapped-disks, lab-adaptation and lab-active, in
+    virtual labs. Default: every study whose requirements are met."""
     scale: Scale = "quick"
     """Size of datasets and training runs: quick for minutes per study, paper for 4,500
     pushes and 10,000 iterations per network."""

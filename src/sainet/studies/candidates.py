@@ -2,7 +2,7 @@
 
 import abc
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -15,12 +15,11 @@ from sainet.learning.fit import fit
 from sainet.learning.process import check_store, fit_process
 from sainet.learning.process_ends import check_inputs
 from sainet.learning.recipes import RESIDUAL, Recipe
-from sainet.models.identity import Features, ModelId, ProcessFeatures
+from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.errors import unknown_name
 from sainet.studies import MEMBERS, CandidateName, Scale
-from sainet.studies.paper_setup import scaled
-from sainet.studies.recorded_models import IDENTIFIED
+from sainet.studies.recorded_models import IDENTIFIED, Variant
 
 
 @dataclass(frozen=True)
@@ -87,28 +86,33 @@ class ChosenProcess(ProcessCandidate):
 
 @dataclass(frozen=True)
 class NetworkCandidate(Candidate):
-    """An additive network around the engine."""
+    """A network that learns from the pushes, alone or around an engine."""
 
-    features: Features
+    variant: Variant
     scale: Scale = "paper"
 
     @property
     def identity(self) -> ModelId:
         """The identity in tables."""
-        return ModelId(
-            kind="sain", simulator=IDENTIFIED, data="residual", features=self.features
-        )
+        return self.variant.identity()
 
     def check(self, store: Store) -> None:
         """Accept all pushes that an engine can be identified on."""
 
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Train the network."""
-        fit("sain", store, self._recipe(store), folder, assumed_engine=internal)
+        is_around = self.variant.engine == "identified"
+        fit(
+            self.variant.network,
+            store,
+            self.recipe(store.info.pushes),
+            folder,
+            assumed_engine=internal if is_around else "planar",
+        )
 
-    def _recipe(self, store: Store) -> Recipe:
-        recipe = RESIDUAL.changed(features=self.features)
-        return scaled(recipe, self.scale, store.info.pushes)
+    def recipe(self, pushes: int) -> Recipe:
+        """Return the recipe for so many pushes."""
+        return self.variant.recipe(self.scale, pushes)
 
 
 @dataclass(frozen=True)
@@ -126,22 +130,26 @@ class EnsembleCandidate(NetworkCandidate):
 
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Train the networks and calibrate them."""
-        recipe = self._recipe(store)
+        recipe = self.recipe(store.info.pushes)
         fit_ensemble(
             "sain", store, recipe, folder, members=MEMBERS, assumed_engine=internal
         )
+
+
+ADDITIVE = Variant("sain", "residual", "identified")
+WITH_PLACE = replace(ADDITIVE, features="place")
 
 
 # From the simplest to the one that needs most: the same table and the same disk.
 CANDIDATES: Mapping[CandidateName, Candidate] = MappingProxyType(
     {
         "gp-angle": ProcessCandidate("angle"),
-        "sain": NetworkCandidate("paper"),
-        "sain-ensemble": EnsembleCandidate("paper"),
+        "sain": NetworkCandidate(ADDITIVE),
+        "sain-ensemble": EnsembleCandidate(ADDITIVE),
         "gp-side": ProcessCandidate("side"),
         "gp-side-chosen": ChosenProcess("side"),
-        "sain-place": NetworkCandidate("place"),
-        "sain-place-ensemble": EnsembleCandidate("place"),
+        "sain-place": NetworkCandidate(WITH_PLACE),
+        "sain-place-ensemble": EnsembleCandidate(WITH_PLACE),
         "gp-place": ProcessCandidate("place"),
         "gp-place-chosen": ChosenProcess("place"),
     }

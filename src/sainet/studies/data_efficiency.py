@@ -1,18 +1,11 @@
-"""How many pushes a network needs: simulated ones, and recorded ones."""
+"""How many simulated pushes a network needs, alone and around an engine."""
 
-import numpy as np
-
-from sainet.datasets.splits import Fold, fold_of_push, make_folds
-from sainet.datasets.store import Store
 from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.measurements import Condition
 from sainet.learning.recipes import PAPER
 from sainet.report.figures.curves import draw_data_efficiency
 from sainet.studies.paper_setup import IN, SAIN, PaperSetup
-from sainet.studies.recorded_models import TunedModels, Variant, surfaces_of
-from sainet.studies.recorded_pushes import FOLDS, SUBJECT, JoinFolds
-from sainet.studies.steps import Evaluate, Given, Join
-from sainet.studies.study import RECORDED as RECORDED_PUSHES
+from sainet.studies.steps import Evaluate, Join
 from sainet.studies.study import Plan, Scope, Study
 
 NETWORKS = (IN, SAIN)
@@ -23,16 +16,9 @@ IN_FULL = Condition(
     label="all, trained in full", factors={"training_pushes": 4500, "iterations": "all"}
 )
 _SHORTER = 4
-RECORDED_COUNTS = {"quick": (10, 20), "paper": (25, 50, 100, 200, 400)}
-VARIANTS = (
-    Variant("in", "tuned"),
-    Variant("sain", "tuned"),
-    Variant("sain", "tuned", "identified"),
-    Variant("sain", "residual", "identified"),
-)
 
 
-def _simulated(scope: Scope) -> Plan:
+def _plan(scope: Scope) -> Plan:
     """Return IN and SAIN, trained on ever more pushes of the robot setup.
 
     Every size has a quarter of the iterations, so that only the data differ: at the
@@ -73,37 +59,10 @@ def of_pushes_again(count: int) -> Condition:
     return Condition(label=f"{count:,}, other trainings", factors=factors)
 
 
-def _recorded(scope: Scope) -> Plan:
-    """Return models tuned on ever more recorded pushes of a surface, cross-validated.
-
-    The smaller sets are parts of the larger ones. A surface with fewer pushes than a
-    size requires gives all of them.
-    """
-    store, sizes = scope.recorded_pushes(), []
-    for pushes in RECORDED_COUNTS[scope.scale]:
-        folds, parts = [], []
-        for rows in surfaces_of(store).values():
-            for fold in make_folds(store, FOLDS[scope.scale], rows):
-                tuned = TunedModels(first_pushes(fold, pushes), scope.scale)
-                models = (*tuned.physics(), *map(tuned.model, VARIANTS))
-                folds.append(fold)
-                parts.append(Evaluate(tuple(models), Given(fold.tests)))
-        sizes.append(JoinFolds(tuple(parts), tuple(folds), of_pushes(pushes)))
-    return Plan(Join(tuple(sizes)))
-
-
-def first_pushes(fold: Fold, pushes: int) -> Store:
-    """Return so many training pushes of a fold, repeats beside each other."""
-    repeats = fold.training.repeats()
-    kinds = fold_of_push(repeats, len(np.unique(repeats)), seed=fold.number)
-    chosen = np.argsort(kinds, kind="stable")[:pushes]
-    return fold.training.take(chosen)
-
-
-SIMULATED = Study(
+STUDY = Study(
     question="How many simulated pushes does a network need, alone and around an "
     "engine?",
-    plan=_simulated,
+    plan=_plan,
     claims=(
         Claim(
             "with 50 training pushes SAIN errs less than IN",
@@ -112,12 +71,4 @@ SIMULATED = Study(
     ),
     figure=draw_data_efficiency,
     figure_name="data-efficiency.svg",
-)
-RECORDED = Study(
-    question="How many recorded pushes of a surface does a model need?",
-    plan=_recorded,
-    needs=(RECORDED_PUSHES,),
-    subject=SUBJECT,
-    figure=draw_data_efficiency,
-    figure_name="recorded-data-efficiency.svg",
 )

@@ -46,6 +46,11 @@ class Rates(msgspec.Struct, frozen=True, kw_only=True):
     cores: int
     kinds: dict[str, Rate]
 
+    def seconds(self, work: Effort) -> float:
+        """Return how long a step is expected to take on that machine."""
+        rate = self.kinds.get(work.kind, Rate(0.0, 0.0))
+        return rate.constant + rate.unit * work.size
+
 
 @cache
 def measured_rates() -> Rates:
@@ -59,13 +64,9 @@ def expected_seconds(steps: Iterable[Step[Any]]) -> Mapping[str, float]:
 
     A machine of twice the cores is expected to take half the time.
     """
-    rates, found = measured_rates(), {}
-    for step in steps:
-        work = effort(step)
-        rate = rates.kinds.get(work.kind, Rate(0.0, 0.0))
-        seconds = rate.constant + rate.unit * work.size
-        found[step.key] = seconds * rates.cores / core_count()
-    return found
+    known = measured_rates()
+    pace = known.cores / core_count()
+    return {step.key: known.seconds(effort(step)) * pace for step in steps}
 
 
 class _Extent(NamedTuple):
@@ -145,5 +146,5 @@ def _(step: Step[Any]) -> Effort:
 @effort.register
 def _(step: cross_validation.FitCandidate) -> Effort:
     identity, pushes = step.candidate.identity, _extent(step.engine).pushes
-    words = filter(None, ("Fit", identity.kind, identity.variant))
+    words = filter(None, ("Fit", identity.kind, identity.data, identity.variant))
     return Effort(" ".join(words), pushes)

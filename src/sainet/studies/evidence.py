@@ -50,24 +50,14 @@ class Evidence:
     def summary(self, name: str) -> Summary:
         """Return the summary of the measurements of a study, or of others."""
         if name not in self._summaries:
-            measured = self.folder / f"{name}.nc.xz"
             summary = load_study(name).summarise if name in STUDIES else summarise
-            self._summaries[name] = (
-                summary(self.measured(name))
-                if measured.is_file()
-                # Of version 0.1.0, until the study is measured again.
-                else documents.read_document(self.folder / f"{name}.json", Summary)
-            )
+            self._summaries[name] = summary(self.measured(name))
         return self._summaries[name]
 
     def find(self, name: str) -> Summary | None:
         """Return the summary of a study, or None if no evidence of it is kept."""
-        paths = (self.folder / f"{name}{end}" for end in (".nc.xz", ".json"))
-        return self.summary(name) if any(p.is_file() for p in paths) else None
-
-    def is_transcribed(self, name: str) -> bool:
-        """Whether the summary of a study was typed, and its measurements are lost."""
-        return not (self.folder / f"{name}.nc.xz").is_file()
+        is_kept = (self.folder / f"{name}.nc.xz").is_file()
+        return self.summary(name) if is_kept else None
 
     def measured(self, name: str) -> Measurements:
         """Return the measurements of a study."""

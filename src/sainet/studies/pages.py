@@ -139,7 +139,6 @@ def origin(name: str, evidence: Evidence) -> str:
     parts = [
         f"Every number{compared}: {files}, made by `make docs`.",
         f"Command: `{words}`." if words else "",
-        TRANSCRIBED if evidence.is_transcribed(name) else "",
         source.note,
         f"Machine: {described(source.manifest)}." if source.manifest else "",
     ]

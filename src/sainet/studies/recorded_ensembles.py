@@ -9,13 +9,14 @@ from dataclasses import replace
 from itertools import product
 
 from sainet.evaluation.claims import Claim, errs_less
-from sainet.studies.candidates import CANDIDATES, EnsembleCandidate, NetworkCandidate
+from sainet.studies import candidates
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED, in_folds
 from sainet.studies.study import RECORDED, Plan, Scope, Study
 
-ONE, SEVERAL = NetworkCandidate("paper"), EnsembleCandidate("paper")
-NETWORKS = (ONE, SEVERAL, *(replace(each, features="place") for each in (ONE, SEVERAL)))
-PROCESS = CANDIDATES["gp-place"]
+_VARIANTS = candidates.ADDITIVE, candidates.WITH_PLACE
+_KINDS = candidates.NetworkCandidate, candidates.EnsembleCandidate
+NETWORKS = tuple(kind(variant) for variant, kind in product(_VARIANTS, _KINDS))
+PROCESS = candidates.CANDIDATES["gp-place"]
 QUICK = 120  # pushes of each group: half of them suffice to calibrate an ensemble
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Int
 from sainet.datasets.groups import surface_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import SIMULATORS, Assumptions, PlanarSpec
-from sainet.learning.recipes import FINE_TUNING, RESIDUAL, Fresh, FromModel
+from sainet.learning.recipes import FINE_TUNING, RESIDUAL, Fresh, FromModel, Recipe
 from sainet.models.card import read_identified
 from sainet.models.checkpoint import load_network
 from sainet.models.dynamics import SimulatorAugmented
@@ -56,6 +56,21 @@ class Variant:
             variant=variant,
         )
 
+    @property
+    def shipped(self) -> str:
+        """The name of the network that was trained on simulated long pushes."""
+        return _LONG_PUSHES[self.network]
+
+    def recipe(self, scale: Scale, pushes: int) -> Recipe:
+        """Return the recipe for so many pushes."""
+        recipes = {
+            "tuned": FINE_TUNING.changed(start=FromModel(self.shipped)),
+            "residual": RESIDUAL,
+            "real": FINE_TUNING.changed(start=Fresh()),
+        }
+        recipe = recipes[self.learned].changed(features=self.features)
+        return scaled(recipe, scale, pushes)
+
 
 def surfaces_of(store: Store) -> dict[str, Int[np.ndarray, " some"]]:
     """Return the pushes on each surface."""
@@ -99,20 +114,15 @@ class TunedModels:
 
     def model(self, variant: Variant, made: Made = "") -> Step[Model]:
         """Return a network, trained where it is to be."""
-        shipped, identity = _LONG_PUSHES[variant.network], variant.identity(made)
+        shipped, identity = variant.shipped, variant.identity(made)
         is_identified = variant.engine == "identified"
         if variant.learned == "simulation" and is_identified:
             return AroundIdentified(identity, shipped, self.identified)
         if variant.learned == "simulation":
             return Load(identity, shipped)
-        recipe = {
-            "tuned": FINE_TUNING.changed(start=FromModel(shipped)),
-            "residual": RESIDUAL,
-            "real": FINE_TUNING.changed(start=Fresh()),
-        }[variant.learned].changed(features=variant.features)
         return Train(
             identity,
             self._pushes,
-            scaled(recipe, self._scale, self._pushes.store.info.pushes),
+            variant.recipe(self._scale, self._pushes.store.info.pushes),
             self.identified if is_identified else None,
         )

@@ -25,7 +25,7 @@ _FIGURES = {
     "error-over-time": "Mean position error of each disk over the time of a push.",
     "episodes": "Shapes at the start (faint) and at the end, and the goal.",
     "data-efficiency": "Errors over training pushes, as many iterations for all.",
-    "recorded-data-efficiency": "Errors over recorded training pushes.",
+    "recorded-few": "Errors over recorded training pushes.",
     "lab-prediction": "Errors over training pushes in the virtual labs.",
     "engine-errors": "Errors of engines at the end of a push, by place and direction.",
 }
