@@ -18,7 +18,6 @@ from sainet.models.correctors import Start
 from sainet.models.correctors.held import unroll_held
 from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.inputs import push_frame
-from sainet.models.integrators import RelaxingResidual
 from sainet.scenes.state import State, pack_motion, unpack_motion
 
 _STREAM = 0x318808
@@ -134,7 +133,7 @@ def _unroll(
     network: AbstractNetwork, disks: int, hold: int
 ) -> Callable[..., Array] | None:
     """Return how training applies a network; None is as prediction does."""
-    if isinstance(network.integrator, RelaxingResidual) and hold > 1:
+    if network.integrator.is_additive and hold > 1:
         return partial(unroll_held, hold=hold)
     if not is_one_gpu():
         return None

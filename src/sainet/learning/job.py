@@ -25,7 +25,6 @@ from sainet.models.card import CARD, WEIGHTS, Card
 from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.identity import ModelId, ModelKind, TrainingData
-from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
 from sainet.runs.digests import digests_from_text, digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document
@@ -228,14 +227,13 @@ def finish(job: Job) -> None:
     task, counts = mixture.lead, mixture.counts
     info, sain = task.store.info, task.model == "sain"
     data = save_arrays(folder.path / WEIGHTS, progress.network)
-    is_additive = isinstance(progress.network.integrator, RelaxingResidual)
     start = task.existing.card if task.existing else None
     card = Card(
         identity=_identity(task),
         kind=info.kind,
         time_step=info.time_step,
         truth_engine=info.engine,
-        integrator="relaxing-residual" if is_additive else "acceleration",
+        integrator=progress.network.integrator.name,
         camera=task.assumed.camera if sain else AGREES,
         data=mixture.content,
         data_seeds=start.data_seeds if start else (),

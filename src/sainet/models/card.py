@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 import msgspec
 
 from sainet.engines.simulator import InternalEngine
-from sainet.models.identity import NETWORKS, Features, ModelId
+from sainet.models.identity import NETWORKS, Features, IntegratorName, ModelId
 from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadCheckpoint, BadInput
 from sainet.runs.folders import CONFIG, remake
@@ -67,7 +67,7 @@ class Card(msgspec.Struct, frozen=True, kw_only=True):
     kind: SetupName  # of the pushes
     time_step: TimeStep  # s
     truth_engine: str  # that made the training data, or `RECORDED`
-    integrator: Literal["acceleration", "relaxing-residual"] = "acceleration"
+    integrator: IntegratorName = "acceleration"
     camera: CameraOffset = AGREES  # of the internal engine
     data: str  # hash of the training data
     disks: Count  # in each push of the training data, at most

@@ -22,7 +22,7 @@ from sainet.models.correctors.feedforward import (
 from sainet.models.correctors.interaction import InteractionNetwork
 from sainet.models.correctors.network import AbstractNetwork, Scales
 from sainet.models.features import AbstractFeatures, FeatureSet, feature_set
-from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
+from sainet.models.integrators import INTEGRATORS, Integrator
 from sainet.models.nominal import NominalFeatures
 from sainet.runs.documents import (
     AGAIN,
@@ -141,8 +141,6 @@ def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
         BadCheckpoint: missing, damaged, of a newer format, or the two do not fit.
     """
     card = read_card(folder)
-    additive = card.integrator == "relaxing-residual"
-    integrator = RelaxingResidual() if additive else Acceleration()
     features = features_of(
         card.identity.features,
         card.kind,
@@ -150,8 +148,7 @@ def load_network(folder: Path) -> tuple[AbstractNetwork, Card]:
         time_step=card.time_step,
         disks=card.disks,
     )
-    hold = card.recipe.hold
-    hold = 1 if hold is msgspec.UNSET else hold
+    integrator, hold = INTEGRATORS[card.integrator], card.recipe.hold or 1
     network = untrained(features, card.time_step, integrator, hold)
     again = "train the network again"
     return load_arrays(folder / WEIGHTS, network, again, known=card.weights), card

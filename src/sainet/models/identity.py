@@ -27,6 +27,7 @@ Features = Literal[
     "whole-state",
     "nominal",
 ]
+IntegratorName = Literal["acceleration", "relaxing-residual"]
 ProcessFeatures = Literal["angle", "side", "place"]  # of Gaussian processes
 Variant = Literal[
     "",

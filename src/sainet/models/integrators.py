@@ -3,13 +3,14 @@
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from sainet.models.identity import IntegratorName
 from sainet.models.inputs import Drive
 
 RELAXATION_TIME = 0.1  # s
@@ -18,6 +19,9 @@ RELAXATION_TIME = 0.1  # s
 @dataclass(frozen=True)
 class Integrator(ABC):
     """Turns accelerations into motion; its equation is that of `rate`."""
+
+    name: ClassVar[IntegratorName]
+    is_additive: ClassVar[bool] = False  # f is added to the motion of an engine
 
     def step(
         self,
@@ -49,6 +53,8 @@ class Integrator(ABC):
 class Acceleration(Integrator):
     """The paper's form: v' = v + dt f (eq. 7 and 12)."""
 
+    name: ClassVar[IntegratorName] = "acceleration"
+
     def rate(self, rate: Array, drive: Drive, time_step: float) -> Array:
         """Return v."""
         del drive, time_step
@@ -73,6 +79,9 @@ class RelaxingResidual(Integrator):
     e' = e + dt d'. Friction stops a pushed body as fast as that; otherwise f would add
     up for seconds.
     """
+
+    name: ClassVar[IntegratorName] = "relaxing-residual"
+    is_additive: ClassVar[bool] = True
 
     tau: float = RELAXATION_TIME  # s
 
@@ -100,6 +109,8 @@ class RelaxingResidual(Integrator):
             pose_of_change=time_step * np.cumsum(added),
         )
 
+
+INTEGRATORS = {each.name: each for each in (Acceleration(), RelaxingResidual())}
 
 # Typical sizes of x, y (m), angle (rad) and their rates, which make a gradient with
 # respect to packed motion dimensionless.

@@ -33,7 +33,7 @@ from sainet.models.correctors.network import (
 )
 from sainet.models.features import AbstractFeatures, FeatureSet
 from sainet.models.inputs import Moment, given
-from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
+from sainet.models.integrators import Acceleration, Integrator
 
 
 class Position(Block):
@@ -142,8 +142,7 @@ class FeedforwardNetwork(AbstractNetwork):
         """
         widths = (features.body_size, *WIDTHS, 3 * features.disks)
         layers = Layers(widths, key=key)
-        is_additive = isinstance(integrator, RelaxingResidual)
-        self.layers = silenced(layers) if is_additive else layers
+        self.layers = silenced(layers) if integrator.is_additive else layers
         self.scales = scales or unit_scales(features)
         self.features = features
         self.time_step = time_step

@@ -68,8 +68,7 @@ class InteractionNetwork(AbstractNetwork):
         rel_key, dyn_key = jax.random.split(key)
         self.rel = Layers((features.pair_size, *WIDTHS), key=rel_key)
         dyn = Layers((features.body_size + EFFECT, *WIDTHS, 3), key=dyn_key)
-        is_additive = isinstance(integrator, integrators.RelaxingResidual)
-        self.dyn = silenced(dyn) if is_additive else dyn
+        self.dyn = silenced(dyn) if integrator.is_additive else dyn
         self.scales = scales or unit_scales(features)
         self.features = features
         self.time_step = time_step
