@@ -4,24 +4,17 @@ import jax.numpy as jnp
 import numpy as np
 
 import sainet as sn
-from sainet.control.episode import ControlStep, run_episode
-from sainet.engines import make_engine
-from sainet.planning import make_planner
-from sainet.robots.simulated import SimulatedRobot
-from sainet.tasks.push_to_goal import PushToGoal
-from sainet.worlds.noise import NoiseConfig
-from sainet.worlds.setups import RobotSetup
-from sainet.worlds.world import SimulatedWorld
+from sainet.control.episode import ControlStep
 
 # The world: a rough table, noise, and a friction that is no input of the model.
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059], table_friction=0.12)
 state = scene.in_a_row()
-engine, rng = make_engine("planar"), np.random.default_rng(0)
-world = SimulatedWorld(engine, RobotSetup(), NoiseConfig(), rng)
-robot = SimulatedRobot(world, scene, state)
+engine, rng = sn.make_engine("planar"), np.random.default_rng(0)
+world = sn.SimulatedWorld(engine, sn.RobotSetup(), sn.NoiseConfig(), rng)
+robot = sn.SimulatedRobot(world, scene, state)
 
 # The goal: 100 mm ahead of disk 2, 20 mm to the side.
-task = PushToGoal(state.position[1] + jnp.array([0.10, 0.02]))
+task = sn.PushToGoal(state.position[1] + jnp.array([0.10, 0.02]))
 
 
 def tell(step: ControlStep) -> None:
@@ -33,6 +26,6 @@ def tell(step: ControlStep) -> None:
     print(f"{away:6.1f} mm to go: contact {push[0]:+.0f}, direction {push[1]:+.0f} deg")
 
 
-planner = make_planner("greedy")
-episode = run_episode(robot, planner, "sain", task, scene, on_step=tell)
+planner = sn.make_planner("greedy")
+episode = sn.run_episode(robot, planner, "sain", task, scene, on_step=tell)
 print(f"{episode.reason} after {len(episode.steps)} pushes")

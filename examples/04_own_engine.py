@@ -5,7 +5,6 @@ from dataclasses import replace
 import jax.numpy as jnp
 
 import sainet as sn
-from sainet.tasks.push_to_goal import PushToGoal
 
 
 def step(scene: sn.Scene, state: sn.State) -> sn.State:
@@ -23,5 +22,5 @@ network = sn.tune("sain", train, engine=carrying, iterations=10)
 table = sn.evaluate({"physics": "physics", "own": carrying, "sain": network}, test)
 print(table)
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
-task, planner = PushToGoal(jnp.array([0.2, 0.05])), sn.make_planner("greedy")
+task, planner = sn.PushToGoal([0.2, 0.05]), sn.make_planner("greedy")
 print(planner.plan(network, task, scene, scene.in_a_row()).pushes[0])

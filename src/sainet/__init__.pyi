@@ -30,6 +30,7 @@ from sainet.engines import make_engine as make_engine
 from sainet.engines.base import AbstractEngine as AbstractEngine
 from sainet.engines.base import AssumedProperties as AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine as PlanarEngine
+from sainet.identification.adaptation import Adaptation as Adaptation
 from sainet.learning.fit import fit as fit
 from sainet.learning.recipes import FromModel as FromModel
 from sainet.learning.recipes import FromSimulator as FromSimulator
@@ -44,6 +45,7 @@ from sainet.models.identity import ModelId as ModelId
 from sainet.models.library import load_model as load_model
 from sainet.models.model import Model as Model
 from sainet.planning import make_planner as make_planner
+from sainet.robots.simulated import SimulatedRobot as SimulatedRobot
 from sainet.scenes.controls import ForceControls as ForceControls
 from sainet.scenes.controls import PathControls as PathControls
 from sainet.scenes.pushes import Push as Push
@@ -52,5 +54,9 @@ from sainet.scenes.scene import Scene as Scene
 from sainet.scenes.state import State as State
 from sainet.scenes.state import Trajectory as Trajectory
 from sainet.scenes.state import at_rest as at_rest
+from sainet.tasks.push_to_goal import PushToGoal as PushToGoal
+from sainet.worlds.noise import NoiseConfig as NoiseConfig
+from sainet.worlds.setups import RobotSetup as RobotSetup
+from sainet.worlds.world import SimulatedWorld as SimulatedWorld
 
 __version__: str

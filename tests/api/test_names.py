@@ -4,11 +4,11 @@ import inspect
 from dataclasses import fields
 
 import equinox as eqx
+import msgspec
 import pytest
 
 import sainet as sn
 from sainet.planning.base import Plan
-from sainet.tasks.push_to_goal import PushToGoal
 
 
 def test_editors_complete_the_public_names():
@@ -29,6 +29,9 @@ def test_a_model_says_what_it_is():
     assert repr(sn.load("physics").called("Physics")) == "<Model Physics>"
 
 
+DATACLASSES = (sn.Model, sn.Track, sn.Entry, sn.SimulatedWorld, sn.Adaptation)
+
+
 def shown_types() -> list[type]:
     """Public classes with fields whose shapes and units readers need."""
     found = [getattr(sn, name) for name in sn.__all__]
@@ -36,11 +39,13 @@ def shown_types() -> list[type]:
     return [each for each in modules if issubclass(each, eqx.Module)]
 
 
-@pytest.mark.parametrize("kind", [*shown_types(), sn.Model, Plan, PushToGoal])
+@pytest.mark.parametrize("kind", [*shown_types(), *DATACLASSES, Plan])
 def test_editors_show_every_field(kind):
     """In the docstring: comments in the source are shown by no editor."""
     _, _, attributes = (inspect.getdoc(kind) or "").partition("\nAttributes:\n")
-    names = [each.name for each in fields(kind) if not each.name.startswith("_")]
+    is_struct = issubclass(kind, msgspec.Struct)
+    found = msgspec.structs.fields(kind) if is_struct else fields(kind)
+    names = [each.name for each in found if not each.name.startswith("_")]
     missing = [name for name in names if f"    {name}: " not in attributes]
     assert not missing
 

@@ -55,6 +55,57 @@ def test_scenes_of_a_batch_have_the_rows_of_their_own():
             )
 
 
+def test_vmap_over_masses_and_radii_makes_a_batch_of_scenes():
+    mass, radius = jnp.array([[0.9, 1.0], [1.1, 0.8]]), jnp.array([0.05, 0.06])
+    make = lambda mass: sn.Scene.disks(mass, radius, table_friction=0.2)  # noqa: E731
+    scenes = jax.vmap(make)(mass)
+    for index, row in enumerate(mass):
+        alone = jax.tree.map(lambda x, n=index: x[n], scenes)
+        assert eqx.tree_equal(alone, make(row))
+    turned = jax.vmap(lambda r: sn.Scene.disks(1.0, r))(jnp.array([[0.05], [0.06]]))
+    assert turned.radius.shape == (2, 1)
+
+
+def test_gradients_reach_the_properties_of_a_scene():
+    physics = sn.load("physics-true")
+
+    def turned(radius):
+        scene, push = sn.Scene.disks(1.0, radius), sn.Push(0.0, direction=0.5)
+        found = physics.predict(scene, scene.in_a_row(), push, steps=100)
+        return found.final.angle[0]
+
+    slope = float(jax.grad(turned)(0.05))
+    wanted = float(turned(0.0505) - turned(0.0495)) / 0.001
+    assert slope == pytest.approx(wanted, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: sn.Scene.disks("a", 0.05), "scene: mass is a; give numbers."),
+        (lambda: sn.Scene.disks([1, None], 0.05), "scene: mass is [1, None]; give"),
+        (lambda: sn.Push(np.array("left")), "push: contact_angle is left; give"),
+        (lambda: sn.Push(0, speed=np.array(["x"])), "push: speed is ['x']; give"),
+        (lambda: sn.PushToGoal("ab"), "task: goal is ab; give numbers."),
+        (lambda: sn.at_rest("ab", 0, 0), "state: position is ab; give numbers."),
+    ],
+)
+def test_what_is_no_number_is_named(make, words):
+    with pytest.raises(BadScene) as error:
+        make()
+    assert words in str(error.value)
+
+
+def test_a_goal_is_a_list_or_an_array_of_finite_numbers():
+    planner, model = sn.make_planner("greedy"), sn.load("physics-true")
+    task = sn.PushToGoal([0.2, 0.05])
+    assert eqx.tree_equal(task, sn.PushToGoal(jnp.array([0.2, 0.05])))
+    assert planner.plan(model, task, SCENE, SCENE.in_a_row()).pushes
+    bad = sn.PushToGoal([np.nan, 0.05])
+    with pytest.raises(BadScene, match="task: goal is nan; it must be from -100"):
+        planner.plan(model, bad, SCENE, SCENE.in_a_row())
+
+
 def test_vmap_over_pushes_equals_a_loop_and_a_batch(model):
     state = SCENE.in_a_row()
 

@@ -23,6 +23,10 @@ for call in (
     lambda: sn.tune("sain", pushes, iterations=1.5),
     lambda: sn.Recipe().changed(mirror="no").settings(),
     lambda: sn.cross_validate(pushes, models="foo"),
+    lambda: sn.load(None),
+    lambda: sn.evaluate([3], pushes),
+    lambda: sn.Push("left"),
+    lambda: sn.PushToGoal({}),
 ):
     try:
         call()
@@ -41,6 +45,10 @@ LINES = [
     "UnknownName No candidate named 'foo'. Available: gp-angle, gp-place, "
     "gp-place-chosen, gp-side, gp-side-chosen, sain, sain-ensemble, sain-place, "
     "sain-place-ensemble.",
+    "BadInput model is None; give a name, a folder or a model.",
+    "BadInput model is 3; give a name, a folder or a model.",
+    "BadScene push: contact_angle is left; give numbers.",
+    "BadScene task: goal is {}; give numbers.",
 ]
 
 

@@ -202,7 +202,7 @@ HOSTILE = {
     "jump of the angle": (change(100, "angle", 2.5), "row 100: .*: the angle jumps"),
     "millimetres": (
         each("y", 1000),
-        "y is 100 .in millimetres.*; it must be from -5 to 5 m",
+        "y is 100 .in millimetres.*; it must be from -5 to 5 m; in another unit, give",
     ),
     "pusher in millimetres": (
         each("pusher_x", 1000),

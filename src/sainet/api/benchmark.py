@@ -35,18 +35,31 @@ _Link = Annotated[str, Meta(pattern=r"\A(https?://[^\s<>|()\[\]]+)?\Z", max_leng
 
 
 class Track(Struct, frozen=True, kw_only=True):
-    """Test pushes that everybody predicts, and the errors that count."""
+    """Test pushes that everybody predicts, and the errors that count.
+
+    Attributes:
+        title: in headings.
+        study: whose models are ranked beside entries.
+        command: makes the dataset.
+        hash: of starts, commands and repeats, by `hash_of`.
+        travel_mm: of each disk, mean of the true pushes (mm).
+        condition: of the study; empty: its only one.
+        beside: conditions of other studies on the same folds.
+        position: the error that counts: mean over a push, or at its end (mm).
+        rotation: the same (degrees).
+        folds: 1 if models may be trained on any pushes but the track's.
+    """
 
     title: str
-    study: str  # whose models are ranked beside entries
-    command: str  # that makes the dataset
-    hash: str  # of starts, commands and repeats, by `hash_of`
-    travel_mm: tuple[float, ...]  # of each disk, mean of the true pushes
-    condition: str = ""  # of the study; empty: its only one
-    beside: dict[str, str] = {}  # conditions of other studies on the same folds
-    position: str = "pos_mm"  # error that counts: mean over a push, or at its end (mm)
-    rotation: str = "rot_deg"  # the same (degrees)
-    folds: int = 1  # 1: models may be trained on any pushes but the track's
+    study: str
+    command: str
+    hash: str
+    travel_mm: tuple[float, ...]
+    condition: str = ""
+    beside: dict[str, str] = {}
+    position: str = "pos_mm"
+    rotation: str = "rot_deg"
+    folds: int = 1
 
     def fold_of_push(self, pushes: Dataset) -> Int[np.ndarray, " push"]:
         """Return the fold of each push, from 0; repeats of a push are in one fold.
@@ -90,16 +103,28 @@ class Track(Struct, frozen=True, kw_only=True):
 
 
 class Entry(Struct, frozen=True, kw_only=True):
-    """The errors of one file of predictions on one track, as `score` writes them."""
+    """The errors of one file of predictions on one track, as `score` writes them.
 
-    name: Annotated[_Text, Meta(min_length=1)]  # of the model
+    Attributes:
+        name: of the model.
+        authors: of the model.
+        link: to a paper or code; may be empty.
+        track: name of the track.
+        hash: of the dataset, as in `Track`.
+        predictions: SHA-256 of the file.
+        errors: of each body, with 95 % intervals (mm, degrees).
+        digest: SHA-256 of all other fields.
+        format_version: of this document.
+    """
+
+    name: Annotated[_Text, Meta(min_length=1)]
     authors: _Text
-    link: _Link  # to a paper or code; may be empty
+    link: _Link
     track: str
-    hash: str  # of the dataset, as in `Track`
-    predictions: str  # SHA-256 of the file
-    errors: tuple[Row, ...]  # of each body, with 95 % intervals (mm, degrees)
-    digest: str = ""  # SHA-256 of all other fields
+    hash: str
+    predictions: str
+    errors: tuple[Row, ...]
+    digest: str = ""
     format_version: int = 1
 
     def digested(self) -> "Entry":

@@ -30,8 +30,8 @@ class Evaluate:
 
     model: tuple[str, ...] = ()
     """Models to compare: physics, physics-true, shipped networks (in, sain,
-    sain-bullet, sain-any), or run folders of trained models. Default: physics and the
-    shipped networks that fit the data."""
+    sain-bullet, sain-any; for one disk in-stroke, sain-stroke), or run folders of
+    trained models. Default: physics and the shipped networks that fit the data."""
     data: Path
     """Dataset of pushes to predict."""
     group: str | None = None

@@ -91,7 +91,7 @@ class ControlConfig(RobotConfig):
         require_one_of("goals", self.goals, get_args(Goals))
         most = self.disks - _LEAST_ROW
         require_count("obstacles", self.obstacles, low=0)
-        wanted = f"from 0 to {most}, which is `disks` less {_LEAST_ROW}"
+        wanted = f"at most {most} with {self.disks} disks"
         require(self.obstacles <= most, "obstacles", wanted, self.obstacles)
         if self.moved is not None:
             require_count("moved", self.moved, high=self.disks - self.obstacles)

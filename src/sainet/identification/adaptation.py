@@ -110,10 +110,14 @@ class Adaptation:
 
     Physics predicts with the estimated properties and is no longer bound to assumed
     ones. A network is given them as inputs; its internal engine stays as it is.
+
+    Attributes:
+        model: that plans.
+        scene: one scene, with the properties given at first.
     """
 
     model: Model
-    scene: Scene  # given at first
+    scene: Scene
     _pushes: "deque[ResampledPush]" = field(
         default_factory=lambda: deque(maxlen=REMEMBERED)
     )

@@ -185,11 +185,17 @@ class Recipe:
     """How a network is trained. The defaults are the paper's (section IV-C)."""
 
     optimiser: Optimiser = Optimiser()
+    """Iterations, batches and learning rate."""
     objective: Objective = Objective()
+    """The loss: its terms, weights and regularisation."""
     horizon: Horizon = WholePush()
+    """Whether a network predicts whole pushes in training, or single steps."""
     augmentation: Augmentation = Augmentation()
+    """Changes of the pushes of a batch."""
     stopping: Stopping = Stopping()
+    """When training ends, and which of its weights are kept."""
     start: Start = Fresh()
+    """Where training starts: random weights, a trained network or the engine."""
     features: Features = "paper"
     """Features of the network. place: also the position on the table and the absolute
     angle, with which the friction of a real surface varies. contact: features of each

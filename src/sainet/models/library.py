@@ -64,6 +64,10 @@ def as_model(model: Loadable, *, engine: str | None = None) -> Model:
     if isinstance(model, AbstractDynamics):
         name = type(model).__name__.lower()
         return Model(ModelId(kind="physics", name=name), model)
+    if not isinstance(model, os.PathLike | str):  # pyright: ignore
+        raise errors.BadInput(
+            f"model is {errors.shown(model)}; give a name, a folder or a model."
+        )
     return load_model(os.fspath(model), engine=engine)
 
 

@@ -6,7 +6,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.core import Tracer
 
 from sainet.models.dynamics import AbstractDynamics, predict
 from sainet.runs.errors import BadScene, require
@@ -14,7 +13,7 @@ from sainet.scenes.controls import Controls, PathControls
 from sainet.scenes.pushes import Push, PushGrid, command_path
 from sainet.scenes.quantities import CONTACT_ANGLE, DIRECTION, SPEED, STROKE
 from sainet.scenes.scene import TIME_STEP, Scene
-from sainet.scenes.state import State, Trajectory
+from sainet.scenes.state import State, Trajectory, is_traced
 from sainet.worlds.setups import RobotSetup
 
 _USUAL_STEPS = 200  # of pushes whose length or speed is traced, and of no push
@@ -54,11 +53,6 @@ def untrained(push: Push, *names: str) -> list[str]:
     }
     found = [name for name in names or outside if np.any(outside[name])]
     return [f"its {name} is outside the model's training range" for name in found]
-
-
-def is_traced(tree: object) -> bool:
-    """Return whether JAX traces any part."""
-    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
 def steps_of(push: Push, time_step: float) -> int:

@@ -89,6 +89,6 @@ def doubts_of_count(card: Card | ProcessCard | None, disks: int) -> Iterator[str
     if not trained[0] <= disks <= trained[-1]:
         known = " to ".join(map(str, sorted({trained[0], trained[-1]})))
         yield (
-            f"its {card.noun} was trained on pushes of {known} disk(s), this scene "
-            f"has {disks}; train one on such pushes"
+            f"its {card.noun} was trained on pushes of {known} disk(s) and may predict "
+            f"this scene of {disks} badly; train one on such pushes"
         )

@@ -10,7 +10,9 @@ from jaxtyping import Array, Float
 from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.geometry import direction, unit
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, at_rest
+from sainet.scenes.state import State, at_rest, floats
+
+_PARAMETERS = ("contact_angle", "direction", "length", "speed")
 
 
 class Push(eqx.Module):
@@ -50,9 +52,11 @@ class Push(eqx.Module):
         """
         given = contact_angle, direction, length, speed
         kinds = [np.dtype(getattr(each, "dtype", np.float32)) for each in given]
-        floats = [kind for kind in kinds if kind.kind == "f"] or [np.float32]
-        kind = dtypes.canonicalize_dtype(np.result_type(*floats))
-        arrays = jnp.broadcast_arrays(*(jnp.asarray(each, kind) for each in given))
+        found = [kind for kind in kinds if kind.kind == "f"] or [np.float32]
+        kind = dtypes.canonicalize_dtype(np.result_type(*found))
+        named = zip(_PARAMETERS, given, strict=True)
+        arrays = [floats(each, f"push: {name}", kind) for name, each in named]
+        arrays = jnp.broadcast_arrays(*arrays)
         self.contact_angle, self.direction, self.length, self.speed = arrays
 
 

@@ -24,6 +24,7 @@ class Quantity:
     low: float
     high: float
     mistaken_for: str = ""  # the unit that values above the range are usually in
+    remedy: str = ""  # what the user can do about other values, without a full stop
 
     @property
     def wanted(self) -> str:
@@ -58,7 +59,7 @@ class Quantity:
             values: a number or an array.
             where: file and field, or the argument, as the message is to name it.
             error: to raise.
-            remedy: what the user can do, without a full stop.
+            remedy: instead of the quantity's own.
 
         Raises:
             BadInput: or the given subclass, with the value, its range and the remedy.
@@ -70,7 +71,7 @@ class Quantity:
         hint = f" (in {self.mistaken_for}?)" if looks else ""
         raise error(
             f"{where} is {value:g}{hint}; it must be {self.wanted}"
-            + (f"; {remedy}." if remedy else ".")
+            + (f"; {remedy or self.remedy}".rstrip("; ") + ".")
         )
 
     def require(self, name: str, values: object) -> None:

@@ -9,11 +9,12 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene, shown
 from sainet.scenes.quantities import PROPERTIES, TIME_STEP_RANGE
-from sainet.scenes.state import Numbers, State, in_a_row
+from sainet.scenes.state import Numbers, State, floats, in_a_row, is_traced
 
 GRAVITY = 9.81  # m/s^2
 TIME_STEP = 1 / 240  # s, the paper's
@@ -81,13 +82,16 @@ class Scene(eqx.Module):
         mass: Numbers,
         radius: Numbers,
         *,
-        table_friction: float = 0.15,
-        disk_friction: float = 0.25,
-        pusher_friction: float = 0.25,
-        pusher_radius: float = PUSHER_RADIUS,
+        table_friction: ArrayLike = 0.15,
+        disk_friction: ArrayLike = 0.25,
+        pusher_friction: ArrayLike = 0.25,
+        pusher_radius: ArrayLike = PUSHER_RADIUS,
         time_step: float = TIME_STEP,
     ) -> "Scene":
         """Return one scene from plain numbers.
+
+        JAX may trace them: `jax.vmap` over masses makes a batch of scenes. Traced
+        values are not checked.
 
         Args:
             mass: of each disk, kg. One number is that of all disks, of which there is
@@ -121,11 +125,14 @@ class Scene(eqx.Module):
                 raise BadScene(f"scene: {name} is {shown(value)}; give one number.")
         shapes = {**dict.fromkeys(disks, (count,)), **dict.fromkeys(single, ())}
         fields: dict[str, Any] = {
-            name: jnp.broadcast_to(jnp.asarray(each, jnp.float32), shapes[name])
+            name: jnp.broadcast_to(
+                floats(each, f"scene: {name}", np.float32), shapes[name]
+            )
             for name, each in (disks | single).items()
         }
         scene = cls(**fields, time_step=time_step)
-        check_scene(scene)
+        if not is_traced(fields):
+            check_scene(scene)
         return scene
 
     def in_a_row(self) -> State:
@@ -146,13 +153,13 @@ class Scene(eqx.Module):
         return self.mass.shape[:-1]
 
 
-def _count(name: str, values: object) -> int:
+def _count(name: str, values: Any) -> int:  # noqa: ANN401
     """Return the number of disks that have a value, 0 for one number for all.
 
     Raises:
         BadScene: no disk has one, or the values are not one for each disk.
     """
-    shape = np.shape(np.asarray(values))
+    shape = np.shape(values)
     if len(shape) > 1 or 0 in shape:
         raise BadScene(
             f"scene: {name} has the shape {list(shape)}; give one number for each "

@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from typing import Any, cast
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
-from sainet.runs.errors import BadScene
+from sainet.runs.errors import BadScene, shown
 
 Numbers = ArrayLike | Sequence[Any]  # an array, or lists of numbers
 
@@ -104,8 +106,9 @@ def at_rest(position: Numbers, angle: Numbers, pusher_position: Numbers) -> Stat
         angle: of the disks, [body] (rad).
         pusher_position: [2] (m).
     """
-    given = position, angle, pusher_position
-    position, angle, pusher_position = map(_floats, given)
+    position = floats(position, "state: position")
+    angle = floats(angle, "state: angle")
+    pusher_position = floats(pusher_position, "state: pusher_position")
     return State(
         position=position,
         angle=angle,
@@ -116,9 +119,31 @@ def at_rest(position: Numbers, angle: Numbers, pusher_position: Numbers) -> Stat
     )
 
 
-def _floats(numbers: Numbers) -> Array:
+def floats(
+    numbers: Numbers, where: str, dtype: type[np.floating] | np.dtype | None = None
+) -> Array:
+    """Return numbers as an array, which may be traced.
+
+    Args:
+        numbers: arrays of floating-point numbers stay as they are without `dtype`.
+        where: the argument, as messages name it.
+        dtype: of the array; None: single precision.
+
+    Raises:
+        BadScene: they are no numbers.
+    """
     kind = np.dtype(getattr(numbers, "dtype", int)).kind
-    return cast(Array, numbers if kind == "f" else jnp.asarray(numbers, float))
+    if kind == "f" and dtype is None:
+        return cast(Array, numbers)
+    try:
+        return jnp.asarray(numbers, dtype or np.float32)
+    except (TypeError, ValueError):
+        raise BadScene(f"{where} is {shown(numbers)}; give numbers.") from None
+
+
+def is_traced(tree: object) -> bool:
+    """Return whether JAX traces any part."""
+    return any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(tree))
 
 
 def in_a_row(radius: Float[Array | np.ndarray, "*batch body"]) -> State:

@@ -14,8 +14,9 @@ from jaxtyping import Array, Bool, Float
 from sainet.runs.errors import BadScene
 from sainet.scenes.geometry import norm
 from sainet.scenes.pushes import PushGrid
+from sainet.scenes.quantities import POSITION
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State
+from sainet.scenes.state import State, floats
 from sainet.tasks import Goals
 from sainet.tasks.steering import Roll, Steering, steering_of
 
@@ -66,14 +67,14 @@ class PushToGoal(AbstractTask):
     the planner measured for this decision.
 
     Attributes:
-        goal: of the target disk, [2] (m).
+        goal: of the target disk, [2] (m); a list or an array.
         moved: index of the target disk, from 0.
         tolerance: fraction of the radius of the target disk.
         alignment: w (m).
         steering: of the row from disk 1 to the target disk; None with two disks.
     """
 
-    goal: Float[Array, " 2"]
+    goal: Float[Array, " 2"] = eqx.field(converter=lambda p: floats(p, "task: goal"))
     moved: int = eqx.field(static=True, default=1)
     tolerance: float = eqx.field(static=True, default=TOLERANCE_RADII)
     alignment: float = eqx.field(static=True, default=ALIGNMENT)
@@ -102,8 +103,13 @@ class PushToGoal(AbstractTask):
     def seen_from(
         self, roll: Roll, scene: Scene, state: State, grid: PushGrid
     ) -> "PushToGoal":
-        """Return the task with the steering of its row, if there is one."""
+        """Return the task with the steering of its row, if there is one.
+
+        Raises:
+            BadScene: the scene has no such disk, or the goal is out of range.
+        """
         self._moved(state)
+        POSITION.check(self.goal, "task: goal", error=BadScene)
         if self.moved < _ROW:
             return self
         miss = max(self.tolerance, 1e-3) * float(scene.radius[self.moved])

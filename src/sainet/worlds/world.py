@@ -21,13 +21,20 @@ class SimulatedWorld:
     """An engine with noise: on the table, the commands and the measured poses.
 
     Each method draws from the generator, so the order of calls decides the noise.
+
+    Attributes:
+        engine: simulates the true motion.
+        setup: how the pusher is driven.
+        noise: on the table, the commands and the measured poses.
+        rng: draws the noise.
+        precision: in which errors are added.
     """
 
     engine: AbstractEngine
     setup: AbstractSetup
     noise: NoiseConfig
     rng: np.random.Generator
-    precision: type[np.floating] = np.float64  # in which errors are added
+    precision: type[np.floating] = np.float64
 
     def roughen(self, scene: Scene) -> Scene:
         """Return the scene with a random friction field, if noise has one."""

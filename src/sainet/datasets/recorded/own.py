@@ -20,6 +20,8 @@ from sainet.scenes.recording import Conditions, Recording
 
 _log = logging.getLogger(__name__)
 _PLACES = ("x", "y", "pusher_x", "pusher_y")
+_PLACE = replace(checks.PLACE, remedy="in another unit, give `length_unit`")
+_ANGLE = replace(checks.ANGLE, remedy="in another unit, give `angle_unit`")
 _SAME_PLACE = 1e-6  # m
 COLUMNS = tables.Columns(
     texts=("push", "body"),
@@ -125,8 +127,8 @@ def _recordings(
     Rows of different pushes and bodies may be in any order; times of one body in one
     push must rise. Pushes with a problem are left out.
     """
-    table.check(problems, checks.PLACE, *_PLACES)
-    table.check(problems, checks.ANGLE, "angle")
+    table.check(problems, _PLACE, *_PLACES)
+    table.check(problems, _ANGLE, "angle")
     if not table.is_whole:
         return  # further checks would repeat the problems of the header and rows
     for push in _by_push(table, properties):
