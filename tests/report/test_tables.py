@@ -181,7 +181,8 @@ def test_true_properties_that_change_nothing_are_said_once():
 def test_a_table_ends_in_a_verdict():
     text = printed(samples.result(), width=200)
     assert text.rstrip().splitlines()[-1] == (
-        "SAIN errs by 0.59 mm, the engine by 3.60 mm, 6.1 times as much [5.5, 6.7]; "
+        "SAIN errs by 0.59 mm in position on average, the engine by 3.60 mm, 6.1 "
+        "times as much [5.5, 6.7]; "
         "the network without an engine errs by 0.76 mm, the engine with true masses "
         "and radii by 0.83 mm."
     )

@@ -32,8 +32,8 @@ class ControlConfig(RobotConfig):
 
     model: str = "sain-any"
     """Model that plans: physics, physics-true, a shipped network, or the run
-    folder of a trained network. The default is a network for any number of disks; sain
-    is the paper's network."""
+    folder of a trained network. The default accepts any number of disks; sain is the
+    paper's network."""
     goals: Goals = "easy"
     """Goals: easy (within 30 degrees of the disks' axis) or hard (30 to 60 degrees to
     either side)."""

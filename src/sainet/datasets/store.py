@@ -232,7 +232,7 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
     Values are checked when they are read.
 
     Args:
-        path: folder made by `sainet generate` or `sainet import`.
+        path: folder made by `sainet generate`, `import`, `split` or `record`.
         verify: whether to compare every file with its hash.
 
     Raises:

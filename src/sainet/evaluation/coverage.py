@@ -1,4 +1,4 @@
-"""Whether models know how sure they are: regions that should hold the ends of pushes.
+"""Whether the regions of models hold the ends of pushes as often as they should.
 
 Regions of position are ellipses, those of rotation intervals. Their quality is half
 the interval score of Gneiting and Raftery (2007): the half width of a region, plus ten

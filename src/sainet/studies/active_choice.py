@@ -32,6 +32,7 @@ from sainet.models.correctors.process import RESIDUALS
 from sainet.models.fitted_process import rates_at
 from sainet.models.identity import ModelId
 from sainet.models.process_card import ProcessSettings
+from sainet.report.figures.curves import draw_data_efficiency
 from sainet.runs.errors import BadStore
 from sainet.studies import Scale
 from sainet.studies.cross_validation import PHYSICS_IDENTIFIED
@@ -73,8 +74,7 @@ class Draw(Apart[Measurements]):
         """Return the errors of processes that are fitted to ever more pushes."""
         counts = COUNTS[self.scale]
         pool, tests = split_rows(store.repeats(), TESTS, self.number)
-        rng = np.random.default_rng([_STREAM, self.number])
-        order = rng.permutation(pool)
+        order = np.random.default_rng([_STREAM, self.number]).permutation(pool)
         engine = identify(store.take(order[: counts[0]])).engine
         ends = ends_of(store, engine, SETTINGS.features)
         if len(ends.travel) < store.info.pushes:
@@ -178,8 +178,7 @@ def pushes_for_the_last(measured: Measurements, metric: str) -> Estimate:
         at_random.shape[1], size=(RESAMPLES, at_random.shape[1])
     )
     low, high = np.percentile([needed(each) for each in drawn], (2.5, 97.5))
-    whole = needed(np.arange(at_random.shape[1]))
-    return Estimate(whole, float(low), float(high))
+    return Estimate(needed(np.arange(at_random.shape[1])), float(low), float(high))
 
 
 def saving(measured: Measurements, metric: str) -> str:
@@ -209,15 +208,17 @@ def _of_labs(scale: Scale) -> Iterator[Draw]:
 
 
 RECORDED_STUDY = Study(
-    question="How many recorded pushes does a Gaussian process save that chooses them?",
+    question="How many recorded pushes are saved if the Gaussian process chooses them?",
     plan=_recorded,
     subject=RANDOM.slug,
+    figure=draw_data_efficiency,
     needs=(RECORDED,),
 )
 LAB_STUDY = Study(
-    question="Virtual lab: how many pushes does a Gaussian process save that chooses "
+    question="Virtual lab: how many pushes are saved if the Gaussian process chooses "
     "them?",
     plan=_collected,
     subject=RANDOM.slug,
+    figure=draw_data_efficiency,
     needs=(MUJOCO,),
 )

@@ -174,7 +174,6 @@ NUMBERS = Study(
     subject=TRUE_PROPERTIES,
     claims=tuple(_claims()),
     figure=draw_errors_over_disks,
-    figure_name="any-number.svg",
 )
 GAPS = Study(
     question="How do errors depend on the gap between two disks at the start?",

@@ -167,7 +167,7 @@ CLAIMS = (
     PaperClaim(
         "SAIN generalises to objects of other shapes",
         "abstract",
-        reason="the engines and networks here know disks only",
+        reason="the engines and networks here predict disks only",
     ),
     PaperClaim(
         "all of this on a real robot with two disks",

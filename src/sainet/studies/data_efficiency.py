@@ -70,5 +70,4 @@ STUDY = Study(
         ),
     ),
     figure=draw_data_efficiency,
-    figure_name="data-efficiency.svg",
 )

@@ -32,7 +32,7 @@ from sainet.studies.study import TABLE, Result
 from sainet.tasks import Goals
 
 _SUMMARY = """A robot pushes a disk that pushes another disk. An engine with assumed \
-masses, radii and friction predicts such contacts badly (Physics); a network alone \
+masses, radii and friction predicts such contacts poorly (Physics); a network alone \
 learns them from data (IN); SAIN takes the engine's prediction and learns the \
 residual. All pushes here are simulated, with noise; the networks were trained on \
 {pushes:,} pushes for {iterations:,} iterations of the paper's {paper:,}. Physics, \
@@ -69,7 +69,7 @@ def run_demo(
     settings = {"command": "demo", **asdict(config)}
     folder = open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
     compared = _comparison(config)
-    say("1 Simulating pushes, and what an engine with wrong properties predicts.")
+    say("1 Simulating pushes, and the predictions of an engine with wrong properties.")
     *_, network = compared.models
     assert isinstance(network, Train)
     runner.result(network.pushes)

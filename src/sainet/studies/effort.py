@@ -118,7 +118,8 @@ def _(step: steps.Train) -> Effort:
     batch, length = min(optimiser.batch_size, extent.pushes), extent.steps
     computed = batch * min(way.steps, length) / way.hold * extent.disks
     size = optimiser.iterations * computed
-    return Effort(f"Train {way.kind}" + ", held" * (way.hold > 1), size)
+    more = ", held" * (way.hold > 1) + ", one disk" * (extent.disks == 1)
+    return Effort(f"Train {way.kind}{more}", size)
 
 
 @effort.register

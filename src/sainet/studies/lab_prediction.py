@@ -204,5 +204,4 @@ STUDY = Study(
         ),
     ),
     figure=draw_data_efficiency,
-    figure_name="lab-prediction.svg",
 )

@@ -174,7 +174,8 @@ CHAIN_STUDY = Study(
     published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
 )
 NOISE_STUDY = Study(
-    question="Are IN and SAIN level at every noise, by the letter and as usual?",
+    question="Are the errors of IN and SAIN equal at every noise, by the letter and as "
+    "usual?",
     plan=_noise,
     claims=tuple(
         claim

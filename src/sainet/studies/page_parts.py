@@ -199,7 +199,7 @@ def draw_figures(evidence: Evidence, figures: Path) -> None:
         if summary is None:
             continue
         if study.figure is not None:
-            study.figure(summary, figures / study.figure_name)
+            study.figure(summary, figures / f"{name}.svg")
         elif shown := parts_of(name, summary):
             draw = draw_success if summary.is_of_trials else draw_errors_over_physics
             draw(shown, figures / f"{name}.svg")

@@ -114,7 +114,7 @@ DIRECT_FORCE_THREE_DISKS = Study(
     published=PUBLISHED_DIRECT_FORCE_THREE_DISKS,
 )
 ROBOT_TWO_DISKS = Study(
-    question="Table III: the same as Table I on pushes by a robot?",
+    question="Table III: do the results of Table I hold if a robot pushes?",
     plan=lambda scope: _two_disks("robot", scope),
     claims=_CLAIMS,
     published=PUBLISHED_ROBOT_TWO_DISKS,

@@ -46,7 +46,7 @@ def _claims() -> Iterator[Claim]:
 
 STUDY = Study(
     question="On recorded pushes, what do ensembles of networks add to one network, "
-    "and do they know how sure they are?",
+    "and are their regions calibrated?",
     plan=_plan,
     claims=tuple(_claims()),
     needs=(RECORDED,),

@@ -99,5 +99,4 @@ STUDY = Study(
     subject=PHYSICS_IDENTIFIED.slug,
     claims=tuple(_claims()),
     figure=draw_data_efficiency,
-    figure_name="recorded-few.svg",
 )

@@ -133,7 +133,7 @@ def _errs_less_than_the_engine(
 
 STUDY = Study(
     question="On recorded pushes, does a Gaussian process around the identified engine "
-    "err less than the engine, and does it know how sure it is?",
+    "err less than the engine, and are its regions calibrated?",
     plan=_plan,
     subject=PHYSICS_IDENTIFIED.slug,
     claims=_errs_less_than_the_engine(PROCESSES, "")

@@ -26,6 +26,8 @@ _FIGURES = {
     "episodes": "Shapes at the start (faint) and at the end, and the goal.",
     "data-efficiency": "Errors over training pushes, as many iterations for all.",
     "recorded-few": "Errors over recorded training pushes.",
+    "recorded-active": "Errors over pushes that are chosen or drawn at random.",
+    "lab-active": "Errors over pushes that are chosen or drawn at random.",
     "lab-prediction": "Errors over training pushes in the virtual labs.",
     "engine-errors": "Errors of engines at the end of a push, by place and direction.",
 }

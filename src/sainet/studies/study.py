@@ -183,7 +183,6 @@ class Study:
     compares: bool = True  # models with each other, not only with the truth
     choose: Callable[[Summary], tuple[Choice, ...]] = lambda summary: ()
     figure: Callable[[Summary, Path], Path] | None = None
-    figure_name: str = ""
 
     def check(self, scope: Scope) -> None:
         """Raise the error of the first need that is not met.
@@ -239,7 +238,7 @@ class Study:
             ),
         )
         if self.figure is not None:
-            self.figure(summary, out / self.figure_name)
+            self.figure(summary, out / f"{name}.svg")
         if plan.engine_errors:
             cases = {k: runner.result(v) for k, v in plan.engine_errors.items()}
             draw_engine_errors(cases, out / ENGINE_ERRORS)
