@@ -182,20 +182,14 @@ Start = Fresh | FromModel | FromSimulator
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """How a network is trained. The defaults are the paper's (section IV-C)."""
+    """How a network is trained, by default as in the paper (section IV-C)."""
 
     optimiser: Optimiser = Optimiser()
-    """Iterations, batches and learning rate."""
     objective: Objective = Objective()
-    """The loss: its terms, weights and regularisation."""
-    horizon: Horizon = WholePush()
-    """Whether a network predicts whole pushes in training, or single steps."""
+    horizon: Horizon = WholePush()  # or `SingleSteps()`
     augmentation: Augmentation = Augmentation()
-    """Changes of the pushes of a batch."""
     stopping: Stopping = Stopping()
-    """When training ends, and which of its weights are kept."""
-    start: Start = Fresh()
-    """Where training starts: random weights, a trained network or the engine."""
+    start: Start = Fresh()  # or `FromModel()`, `FromSimulator()`
     features: Features = "paper"
     """Features of the network. place: also the position on the table and the absolute
     angle, with which the friction of a real surface varies. contact: features of each
