@@ -23,6 +23,7 @@ for call in (
     lambda: sn.tune("sain", pushes, iterations=1.5),
     lambda: sn.Recipe().changed(mirror="no").settings(),
     lambda: sn.cross_validate(pushes, models="foo"),
+    lambda: pushes.split(test="a"),
     lambda: sn.load(None),
     lambda: sn.evaluate([3], pushes),
     lambda: sn.Push("left"),
@@ -45,6 +46,7 @@ LINES = [
     "UnknownName No candidate named 'foo'. Available: gp-angle, gp-place, "
     "gp-place-chosen, gp-side, gp-side-chosen, sain, sain-ensemble, sain-place, "
     "sain-place-ensemble.",
+    "BadSetting `test` is a; it must be above 0 and below 1.",
     "BadInput model is None; give a name, a folder or a model.",
     "BadInput model is 3; give a name, a folder or a model.",
     "BadScene push: contact_angle is left; give numbers.",

@@ -144,8 +144,8 @@ def player(model, pushes, solved=True):
     [
         (
             [player("sain", 2), player("physics", 2)],
-            "SAIN and Physics each reach it with 2 pushes, so this goal does not tell "
-            "them apart.",
+            "SAIN and Physics each reach it with 2 pushes, so this goal does not "
+            "distinguish them.",
         ),
         (
             [player("physics", 3), player("sain", 1)],

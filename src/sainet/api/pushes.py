@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
@@ -61,7 +62,8 @@ class Pushes:
             BadSetting: an argument is out of its range.
             BadInput: all pushes are repeats of each other.
         """
-        require(0 < test < 1, "test", "above 0 and below 1", test)
+        is_number = isinstance(test, Real)
+        require(is_number and 0 < test < 1, "test", "above 0 and below 1", test)
         require_count("seed", seed, low=0)
         training, tests = split(self.store, test, seed, chains=chains)
         return replace(self, store=training), replace(self, store=tests)

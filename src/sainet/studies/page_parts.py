@@ -158,7 +158,7 @@ def parts_of(name: str, summary: Summary) -> list[Part]:
     """
     dotted = summary.trials or [f for f in summary.factors if f.model != BASELINE]
     drawn = dict.fromkeys(each.condition for each in dotted)
-    if len({each.model for each in dotted}) == 1:
+    if not summary.trials and len({each.model for each in dotted}) == 1:
         drawn = {}  # nothing to compare
     if len(dotted) > _MOST_DOTS:
         drawn = [label for label in drawn if label in _DRAWN.get(name, ())]
