@@ -60,8 +60,8 @@ def test_vmap_over_masses_and_radii_makes_a_batch_of_scenes():
     make = lambda mass: sn.Scene.disks(mass, radius, table_friction=0.2)  # noqa: E731
     scenes = jax.vmap(make)(mass)
     for index, row in enumerate(mass):
-        alone = jax.tree.map(lambda x, n=index: x[n], scenes)
-        assert eqx.tree_equal(alone, make(row))
+        single = jax.tree.map(lambda x, n=index: x[n], scenes)
+        assert eqx.tree_equal(single, make(row))
     turned = jax.vmap(lambda r: sn.Scene.disks(1.0, r))(jnp.array([[0.05], [0.06]]))
     assert turned.radius.shape == (2, 1)
 
@@ -90,7 +90,7 @@ def test_gradients_reach_the_properties_of_a_scene():
         (lambda: sn.at_rest("ab", 0, 0), "state: position is ab; give numbers."),
     ],
 )
-def test_what_is_no_number_is_named(make, words):
+def test_arguments_that_are_not_numbers_are_named(make, words):
     with pytest.raises(BadScene) as error:
         make()
     assert words in str(error.value)

@@ -25,7 +25,7 @@ MODEL = PhysicsDynamics(Glide())
 
 
 class Lost(Glide):
-    """Loses sight of the disks."""
+    """Predicts NaN for every pose."""
 
     def rollout(self, scene, initial, controls):
         return jax.tree.map(

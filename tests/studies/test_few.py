@@ -134,7 +134,7 @@ def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
     assert all(one < other for one, other in zip(fewer, more, strict=True))
     tests = [set(step.pushes.store.rows) for step in parts[0].parts]
     assert not any(rows & held for rows, held in zip(more, tests, strict=True))
-    alone, around_assumed, around_identified, *_ = parts[0].parts[0].fitted
+    without_engine, around_assumed, around_identified, *_ = parts[0].parts[0].fitted
     assert [each.name for each in parts[0].parts[0].fitted] == [
         "in-tuned",
         "sain-tuned",
@@ -142,7 +142,7 @@ def test_few_pushes_are_parts_of_more(recorded, monkeypatch):
         "gp-identified-side",
         "gp-identified-place",
     ]
-    assert alone.candidate.recipe(10).start == FromModel("in-stroke")
+    assert without_engine.candidate.recipe(10).start == FromModel("in-stroke")
     assert around_assumed.candidate.recipe(10).start == FromModel("sain-stroke")
     assert around_identified.candidate.recipe(10).start == FromSimulator()
 

@@ -27,8 +27,7 @@ class AbstractDynamics(eqx.Module):
 
     Arrays of a `State` are [push, body, ...], of its pusher [push, 2]; those of
     `Controls` [push, time, 2]; those of a `Trajectory` [push, time, body, ...], its
-    pusher [push, time, 2]. `from_function` makes
-    dynamics of a function on arrays.
+    pusher [push, time, 2]. `from_function` makes dynamics of a function on arrays.
 
     `begin` restarts everything at the state that it is given; `advance` never does,
     so that two advances equal one long one.

@@ -130,7 +130,7 @@ def floats(
         dtype: of the array; None: single precision.
 
     Raises:
-        BadScene: they are no numbers.
+        BadScene: they are not numbers.
     """
     kind = np.dtype(getattr(numbers, "dtype", int)).kind
     if kind == "f" and dtype is None:

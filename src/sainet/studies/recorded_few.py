@@ -92,8 +92,8 @@ def _claims() -> Iterator[Claim]:
 
 
 STUDY = Study(
-    question="From how few recorded pushes of a surface does a model learn more than "
-    "the engine that is identified on them?",
+    question="How many recorded pushes of a surface does a model need to predict "
+    "better than the engine that is identified on the same pushes?",
     plan=_plan,
     needs=(RECORDED,),
     subject=PHYSICS_IDENTIFIED.slug,
