@@ -15,6 +15,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.report.figures.overview import draw_errors
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import rotate
 from sainet.scenes.scene import Scene
@@ -107,4 +108,5 @@ STUDY = Study(
     "rotated scene?",
     plan=_plan,
     compares=False,
+    figure=draw_errors,
 )

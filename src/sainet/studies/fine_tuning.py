@@ -1,6 +1,8 @@
 """Settings of fine-tuning on few pushes, compared on surrogate robots."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from sainet.evaluation.measurements import Condition
 from sainet.evaluation.summary import Summary
 from sainet.learning.recipes import FROM_ENGINE, recipe_for, start_named
 from sainet.models.identity import ModelId
+from sainet.report.figures.overview import Ranges, draw_ranges
 from sainet.studies.paper_setup import physics, scaled
 from sainet.studies.runner import Runner
 from sainet.studies.steps import Apart, Evaluate, First, Join, Simulate, Step, Train
@@ -147,9 +150,19 @@ def _score(summary: Summary, where: str) -> float:
     return float(np.mean(tuned / engine))
 
 
+def _draw(summary: Summary, path: Path) -> Path:
+    """Draw the score of each way, with the range over the robots."""
+    rows: Ranges = defaultdict(dict)
+    for each in choose(summary):
+        way = each.cells["way"].replace("`", "")
+        rows[f"{each.pushes} pushes"][way] = [*(each.scores or {}).values()]
+    return draw_ranges({"errors over those of physics": rows}, path)
+
+
 STUDY = Study(
     question="With which settings should networks be fine-tuned on few pushes?",
     plan=_plan,
     needs=(),
     choose=choose,
+    figure=_draw,
 )

@@ -21,6 +21,7 @@ from sainet.evaluation.measurements import Condition, Measurements
 from sainet.learning.recipes import FINE_TUNING, FromModel
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.report.figures.overview import draw_errors
 from sainet.robots import SURFACES, Surface
 from sainet.runs.errors import missing_extra
 from sainet.studies import Scale, steps
@@ -209,4 +210,5 @@ STUDY = Study(
     question="Virtual lab: how does physics err on the pushes that its robot collects?",
     plan=_plan,
     needs=(MUJOCO,),
+    figure=draw_errors,
 )

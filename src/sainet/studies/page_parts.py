@@ -9,8 +9,17 @@ from msgspec import structs
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.arrange import arrange
 from sainet.report.figures.episodes import draw_side_by_side
-from sainet.report.figures.overview import Part, draw_errors_over_physics, draw_success
-from sainet.report.palette import labels_of
+from sainet.report.figures.overview import (
+    Dot,
+    Panel,
+    Part,
+    Section,
+    draw_errors,
+    draw_errors_over_physics,
+    draw_panels,
+    draw_success,
+)
+from sainet.report.palette import labels_of, styles_of
 from sainet.report.pictures import draw_pictures
 from sainet.report.writers import (
     ESTIMATE_HEADINGS,
@@ -112,6 +121,20 @@ def identified(groups: Mapping[str, Identification]) -> str:
     return "\n\n".join(parts)
 
 
+def draw_identified(groups: Mapping[str, Identification], path: Path) -> Path:
+    """Draw the parameters identified on each group of pushes, with their intervals."""
+    styles = styles_of(groups)
+    dots: dict[str, list[Dot]] = {}
+    for group, each in groups.items():
+        for found in each.found.estimates:
+            if found.doubt is None:
+                dot = Dot(styles[group], found.value, found.low, found.high)
+                dots.setdefault(found.name, []).append(dot)
+    sections = [Section(name.replace("_", " "), each) for name, each in dots.items()]
+    label = "value; camera offset in mm, the others without unit"
+    return draw_panels([Panel(label, sections)], path)
+
+
 def bench(found: Benchmark, names: Mapping[str, str]) -> str:
     """Return the figures of a benchmark case as a table, below their origin.
 
@@ -203,6 +226,8 @@ def draw_figures(evidence: Evidence, figures: Path) -> None:
         elif shown := parts_of(name, summary):
             draw = draw_success if summary.is_of_trials else draw_errors_over_physics
             draw(shown, figures / f"{name}.svg")
+    draw_errors(evidence.summary("recorded"), figures / "recorded.svg")
+    draw_identified(evidence.identifications(), figures / "identified.svg")
     for goal, records in evidence.episodes().items():
         draw_side_by_side(records, figures / f"episodes-{goal}.svg")
     draw_pictures(figures)

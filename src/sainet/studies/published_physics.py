@@ -6,14 +6,20 @@ of the overlap at the start and of the steps that count, each error is set besid
 published one.
 """
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
+
+import numpy as np
 
 from sainet.datasets.config import GenerateConfig
 from sainet.evaluation.claims import Claim, Verdict
 from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import BASELINE, Summary
+from sainet.report.figures.curves import METRICS
+from sainet.report.figures.overview import Ranges, draw_ranges
 from sainet.studies import Scale
 from sainet.studies.paper_setup import physics
 from sainet.studies.paper_tables import (
@@ -61,14 +67,23 @@ class Setting:
         }
 
     @property
+    def drive(self) -> str:
+        """What moves the disks."""
+        config = self.config
+        if config.setup == "direct-force":
+            return f"{config.damping_n_s_m:g} N s/m, {config.force_n:g} N"
+        return f"{config.speed_mm_s[0]:g} mm/s"
+
+    @property
+    def counted(self) -> str:
+        """The steps that count, where that varies; continues a sentence."""
+        return f", {self.steps} steps" if self.steps else ""
+
+    @property
     def label(self) -> str:
         """The setting in words."""
-        config = self.config
-        drive = f"{config.speed_mm_s[0]:g} mm/s"
-        if config.setup == "direct-force":
-            drive = f"{config.damping_n_s_m:g} N s/m, {config.force_n:g} N"
-        counted = f", {self.steps} steps" if self.steps else ""
-        return f"{drive}, gap {config.gap_mm:g} mm, noise × {self.noise}{counted}"  # noqa: RUF001
+        gap, noise = self.config.gap_mm, self.noise
+        return f"{self.drive}, gap {gap:g} mm, noise × {noise}{self.counted}"  # noqa: RUF001
 
     def pushes(self, count: int) -> Simulate:
         """Return the pushes of the setting, simulated by Bullet."""
@@ -168,10 +183,24 @@ def closest(summary: Summary) -> tuple[Choice, ...]:
     return tuple(sorted(found, key=lambda each: each.score))
 
 
+def _draw(summary: Summary, path: Path) -> Path:
+    """Draw errors over the published ones: of each drive, the mean and the range."""
+    panels: dict[str, Ranges] = {}
+    for metric, label in METRICS.items():
+        rows = panels[f"{label} over the published"] = defaultdict(dict)
+        for each in _measured(summary):
+            ours = np.sum(summary.errors(BASELINE, metric, each.label))
+            theirs = np.sum(np.array(each.published().values[metric], float))
+            row = rows[each.config.setup].setdefault(each.drive + each.counted, [])
+            row.append(float(ours / theirs))
+    return draw_ranges(panels, path)
+
+
 STUDY = Study(
     question="Does any plausible setting give the published errors of Physics?",
     plan=_plan,
     compares=False,
     choose=closest,
+    figure=_draw,
     claims=(_is_near(("pos_mm",)), _is_near(("pos_mm", "rot_deg"))),
 )

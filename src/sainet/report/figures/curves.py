@@ -184,17 +184,17 @@ def _of(rows: list[_Row], model: str, body: int) -> list[_Row]:
 
 def _end(rows: list[_Row], metric: str) -> tuple[float, float]:
     last = rows[-1]
-    return last.pushes, _estimate(last.row, metric).value or 0.0
+    return last.pushes, estimate_of(last.row, metric).value or 0.0
 
 
-def _estimate(row: Row, metric: str) -> Estimate:
+def estimate_of(row: Row, metric: str) -> Estimate:
     """Return the mean over a push; the error of its end where only that is known."""
     return row.values.get(metric) or row.values[f"final_{metric}"]
 
 
 def _draw_model(axes: Axes, style: ModelStyle, rows: list[_Row], metric: str) -> None:
     pushes = [each.pushes for each in rows]
-    found = [_estimate(each.row, metric) for each in rows]
+    found = [estimate_of(each.row, metric) for each in rows]
     error, low, high = np.array([(e.value, e.low, e.high) for e in found], float).T
     learns = np.ptp(error) > 0
     look = canvas.line_look(style, 1.6 if learns else 1.0)

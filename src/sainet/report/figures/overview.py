@@ -1,7 +1,9 @@
 """Overviews: a dot with its interval for each model, in sections, beside the paper."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from statistics import fmean
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +19,8 @@ from matplotlib.ticker import (
 from sainet.evaluation.claims import our_model
 from sainet.evaluation.summary import BASELINE, Summary
 from sainet.report.figures import canvas
-from sainet.report.palette import INK, ModelStyle, styles_of
+from sainet.report.figures.curves import METRICS, estimate_of
+from sainet.report.palette import INK, ModelStyle, style_of, styles_of
 
 _METRIC = "pos_mm"
 _SHARES = (0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0, 1.5, 2, 3, 5, 7, 10, 20)
@@ -49,6 +52,14 @@ class Part(NamedTuple):
     condition: str = ""
 
 
+class Panel(NamedTuple):
+    """Sections beside one axis; every panel of a figure has the same rows."""
+
+    label: str  # of the axis
+    sections: Sequence[Section]
+    scale: Callable[[Axes], object] = lambda _: None  # sets the axis
+
+
 def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
     """Draw each model's position error over that of physics, on a logarithmic axis.
 
@@ -59,18 +70,8 @@ def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
         path: where to write; ``.svg`` or ``.png``.
     """
     sections = [Section(part.title, [*_ratios(part)]) for part in parts]
-    with canvas.house_look():
-        figure = canvas.new_figure(7.6, _height(sections))
-        axes = figure.subplots()
-        axes.set(xscale="log", xlabel="position error over that of physics")
-        axes.xaxis.set_major_locator(FixedLocator(_SHARES))
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        axes.axvline(1, color=INK, linewidth=0.8)
-        _draw(axes, sections)
-        # An interval may reach far below every number.
-        axes.set_xlim(left=max(axes.get_xlim()[0], _SHARES[0] / 2))
-        return canvas.save(figure, path)
+    label = "position error over that of physics"
+    return draw_panels([Panel(label, sections, _set_ratios)], path)
 
 
 def draw_success(parts: Sequence[Part], path: Path) -> Path:
@@ -81,13 +82,99 @@ def draw_success(parts: Sequence[Part], path: Path) -> Path:
         path: where to write; ``.svg`` or ``.png``.
     """
     sections = [Section(part.title, [*_successes(part)]) for part in parts]
+    return draw_panels([Panel("goals solved", sections, _set_shares)], path)
+
+
+def draw_errors(summary: Summary, path: Path) -> Path:
+    """Draw each model's errors, disk by disk, with their intervals.
+
+    Args:
+        summary: of the measurements, a section for each condition.
+        path: where to write; ``.svg`` or ``.png``.
+    """
+    panels = [
+        Panel(
+            label,
+            [
+                Section(each.label, [*_errors(summary, each.label, metric)])
+                for each in summary.conditions
+            ],
+            lambda axes: axes.set_xlim(left=0),
+        )
+        for metric, label in METRICS.items()
+    ]
+    return draw_panels(panels, path)
+
+
+Ranges = dict[str, dict[str, list[float]]]  # by section and row
+
+
+def draw_ranges(panels: Mapping[str, Ranges], path: Path) -> Path:
+    """Draw the mean and the range of the ratios in each row.
+
+    Args:
+        panels: ratios by the label of their axis.
+        path: where to write; ``.svg`` or ``.png``.
+    """
+    style, shown = style_of(BASELINE), list[Panel]()
+    for label, ranges in panels.items():
+        sections = [
+            Section(
+                title,
+                [
+                    Dot(replace(style, label=row), fmean(v), min(v), max(v))
+                    for row, v in rows.items()
+                ],
+            )
+            for title, rows in ranges.items()
+        ]
+        shown.append(Panel(label, sections, _set_ratios))
+    return draw_panels(shown, path)
+
+
+def draw_panels(panels: Sequence[Panel], path: Path) -> Path:
+    """Draw panels side by side, with the names of their rows on the left.
+
+    Args:
+        panels: with the same sections and names.
+        path: where to write; ``.svg`` or ``.png``.
+    """
     with canvas.house_look():
-        figure = canvas.new_figure(7.6, _height(sections))
-        axes = figure.subplots()
-        axes.set(xlim=(0, 1.02), xlabel="goals solved")
-        axes.xaxis.set_major_formatter(PercentFormatter(1))
-        _draw(axes, sections)
+        figure = canvas.new_figure(4 + 3.6 * len(panels), _height(panels[0].sections))
+        places = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+        for panel, axes in zip(panels, places, strict=True):
+            _draw(axes, panel.sections, named=axes is places[0])
+            axes.set_xlabel(panel.label)
+            panel.scale(axes)
         return canvas.save(figure, path)
+
+
+def _set_ratios(axes: Axes) -> None:
+    """Make an axis one of ratios: logarithmic, with a line at one."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(FixedLocator(_SHARES))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.axvline(1, color=INK, linewidth=0.8)
+    # An interval may reach far below every number.
+    axes.set_xlim(left=max(axes.get_xlim()[0], _SHARES[0] / 2))
+
+
+def _set_shares(axes: Axes) -> None:
+    axes.set_xlim(0, 1.02)
+    axes.xaxis.set_major_formatter(PercentFormatter(1))
+
+
+def _errors(summary: Summary, condition: str, metric: str) -> Iterator[Dot]:
+    rows = [row for row in summary.rows if row.condition == condition]
+    styles = styles_of((row.model for row in rows), summary.models)
+    several = len({row.body for row in rows}) > 1
+    for row in rows:
+        style, found = styles[row.model], estimate_of(row, metric)
+        if several:
+            style = replace(style, label=f"{style.label}, disk {row.body}")
+        if found.value is not None:
+            yield Dot(style, found.value, found.low or 0, found.high or found.value)
 
 
 def _ratios(part: Part) -> Iterator[Dot]:
@@ -133,12 +220,13 @@ def _height(sections: Sequence[Section]) -> float:
     return _ENDS + _ROW * sum(len(section.dots) + 1.6 for section in sections)
 
 
-def _draw(axes: Axes, sections: Sequence[Section]) -> None:
+def _draw(axes: Axes, sections: Sequence[Section], *, named: bool) -> None:
     """Draw the sections from top to bottom, and a legend of the published marks."""
     place, names = 0.0, dict[float, str]()
     for section in sections:
-        title = axes.get_yaxis_transform()
-        axes.text(0, place, section.title, transform=title, weight="bold", va="center")
+        if named:
+            at = axes.get_yaxis_transform()
+            axes.text(0, place, section.title, transform=at, weight="bold", va="center")
         for dot in section.dots:
             place += 1
             names[place] = dot.style.label
