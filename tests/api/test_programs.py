@@ -6,11 +6,9 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-import equinox as eqx
 import pytest
 
 from api.programs import CONTROL, OWN_DATA, PREDICT
-from sainet import PushGrid, make_planner
 from sainet.learning import recipes
 from support import SOURCE, require
 
@@ -49,14 +47,8 @@ def test_own_data(folder, monkeypatch, few_iterations, capsys):
     assert [path.name for path in (folder / "runs").iterdir()] == ["recorded"]
 
 
-def test_control(monkeypatch):
-    """With 18 pushes to choose from: sequences of two of 72 take a minute here."""
+def test_control():
     require(find_spec("gymnasium"), "gymnasium is not installed")
-    few = PushGrid(contact_bins=6, direction_bins=3)
-    monkeypatch.setattr(
-        "sainet.control.gym.policy.make_planner",
-        lambda name: eqx.tree_at(lambda p: p.actions, make_planner(name), few),
-    )
     names = run(CONTROL)
     assert names["terminated"] and names["info"]["is_success"]
 
