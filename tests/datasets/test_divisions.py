@@ -77,6 +77,22 @@ def test_copies_stay_together(tmp_path, scheme):
     assert set(owner) == set(range(FOLDS))
 
 
+@pytest.mark.parametrize("scheme", ["place", "direction", "side"])
+def test_equal_values_are_not_parted(tmp_path, scheme):
+    """Of two directions, one is in three quarters of all pushes: no fold has both."""
+    info, arrays, _ = spread()
+    some, many = EVERY[:1].repeat(PUSHES // 4), EVERY[1:2].repeat(3 * PUSHES // 4)
+    rows = np.concatenate([some, many])
+    same = {"initial", "initial_pusher", "command_position"}
+    two = {k: np.asarray(v)[rows] if k in same else v for k, v in arrays.items()}
+    store = write(tmp_path / "data", info, two)
+    assert len({*zip(rows, folds_by(store, scheme, 2, EVERY), strict=True)}) == 2
+    with pytest.raises(BadStore, match=f"2 of them different by {scheme}.*fewer folds"):
+        folds_by(store, scheme, 3, EVERY)
+    with pytest.raises(BadStore, match=rf"1 of them different by {scheme}.*take anoth"):
+        folds_by(store, scheme, 2, EVERY[-20:])
+
+
 def test_a_part_has_the_kinds_of_the_whole_and_blocks_of_its_own(spread_out):
     store, _ = spread_out
     rows = np.arange(5, 35)
@@ -89,5 +105,5 @@ def test_a_part_has_the_kinds_of_the_whole_and_blocks_of_its_own(spread_out):
 @pytest.mark.parametrize("scheme", get_args(Scheme))
 def test_too_few_pushes_are_refused(spread_out, scheme):
     store, _ = spread_out
-    with pytest.raises(BadStore, match=rf"2 pushes.*by {scheme}.*fewer folds"):
+    with pytest.raises(BadStore, match=rf"2 pushes.*by {scheme}.*another division"):
         folds_by(store, scheme, 3, EVERY[:2])

@@ -64,6 +64,12 @@ def test_an_unfinished_store_names_the_command_that_resumes(copy):
     assert "again" in message
 
 
+@pytest.mark.parametrize("name", ["config.json", "manifest.json"])
+def test_a_store_of_unknown_origin_is_refused(copy, name):
+    (copy / name).unlink()
+    assert f"{name}: missing, so the origin of the pushes is unknown" in refusal(copy)
+
+
 @pytest.mark.parametrize("verify", [True, False])
 def test_a_deleted_chunk_is_named(copy, verify):
     (copy / CHUNK).unlink()

@@ -139,8 +139,8 @@ def swapped(one: int, other: int) -> str:
     return to_csv(table)
 
 
-def in_groups() -> str:
-    return to_csv([[*r, k > 7] for k, r in enumerate(rows())], GROUPED)
+def in_groups(column: str = "group") -> str:
+    return to_csv([[*r, k > 7] for k, r in enumerate(rows())], [*HEADER, column])
 
 
 HOSTILE = {
@@ -216,7 +216,25 @@ HOSTILE = {
     "one sample": (to_csv(rows()[:2]), "row 3: push '1': has fewer than two samples"),
     "too short": (to_csv(rows(rate=5000)[:4]), "push '1': lasts less than a step"),
     "groups": (in_groups(), "row .*: push '1' is in several groups"),
+    "kinds": (in_groups("kind"), "row .*: push '1' is in several kinds"),
 }
+
+
+def test_pushes_of_one_kind_are_repeats(tmp_path: Path):
+    """Unless their groups differ."""
+    kinds = {"1": "left", "2": "right", "3": "left", "4": "left"}
+    table = [
+        [*row, kind, "wood" if push == "4" else "felt"]
+        for push, kind in kinds.items()
+        for row in rows(push, 30, 0.3)
+    ]
+    text = to_csv(table, [*HEADER, "kind", "group"])
+    store = import_table(*write(tmp_path, text), tmp_path / "out")
+    one, two, three, four = store.take([0, 1, 2, 3]).read(slice(None), ("repeat",))[
+        "repeat"
+    ]
+    assert one == three
+    assert len({one, two, four}) == 3
 
 
 @pytest.mark.parametrize("case", HOSTILE)

@@ -239,7 +239,7 @@ def test_interval_scores_are_those_of_the_definition():
 @pytest.mark.parametrize("disks", [1, 3])
 def test_other_numbers_of_disks_are_refused(model, disks):
     scene = sn.Scene.disks(mass=[1.0] * disks, radius=[0.055] * disks)
-    with pytest.raises(BadCheckpoint, match=f"of 2 disk.s., these have {disks};"):
+    with pytest.raises(BadCheckpoint, match=f"takes 2 disk.s., not {disks};"):
         model.predict(scene, scene.in_a_row(), sn.Push(contact_angle=0.1))
 
 
@@ -287,8 +287,21 @@ def test_pushes_that_cannot_be_used_are_refused(changes, message, tmp_path):
 def test_an_input_that_never_varies_is_refused(store):
     """One push, eight times."""
     one = store.take([0] * 8)
-    with pytest.raises(BadInput, match="the contact angle is the same in all pushes"):
+    with pytest.raises(BadStore, match="pushes: the contact angle is the same in all"):
         ends_of(one, PLANAR, "angle")
+
+
+def test_a_process_without_an_input_is_the_remedy_where_that_never_varies(tmp_path):
+    """All pushes begin with the same poses, and a refusal leaves nothing behind."""
+    info = info_of(12)
+    arrays = made_up(info)
+    for name in ("initial", "initial_pusher"):
+        arrays[name][:] = arrays[name][:1]
+    write_store(tmp_path / "data", info, arrays)
+    store, out = open_store(tmp_path / "data"), tmp_path / "gp"
+    with pytest.raises(BadStore, match="side of the disk is the same .* without it"):
+        fit_process(store, out, PLANAR, ProcessSettings(features="place"))
+    assert not out.exists()
 
 
 def edited(folder, tmp_path, **changes):

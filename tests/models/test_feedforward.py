@@ -95,7 +95,7 @@ def test_only_the_number_of_disks_that_it_was_made_for(kind, simulator, disks):
     model = dynamics(simulator=simulator, disks=disks, kind=kind)
     found = predict(model, *pushes(kind, disks))
     assert jnp.all(jnp.isfinite(found.states.position))
-    says = f"takes {disks} disks, not {5 - disks}; use an interaction network"
+    says = f"takes {disks} disk.s., not {5 - disks}; use a network for any number"
     with pytest.raises(BadCheckpoint, match=says):
         predict(model, *pushes(kind, 5 - disks))
 
@@ -105,10 +105,10 @@ def test_planners_and_models_refuse_other_scenes_at_once(trained):
     model = load_model(str(folder))
     assert isinstance(model, Model)
     scene = Scene.disks([1.0] * 3, [0.05] * 3)
-    with pytest.raises(BadCheckpoint, match="takes 2 disks, not 3"):
+    with pytest.raises(BadCheckpoint, match="takes 2 disk.s., not 3"):
         model.predict(scene, scene.in_a_row(), Push(0.1, 0.0))
     task = PushToGoal(goal=jnp.array([0.3, 0.0]), tolerance=0.01)
-    with pytest.raises(BadCheckpoint, match="takes 2 disks, not 3"):
+    with pytest.raises(BadCheckpoint, match="takes 2 disk.s., not 3"):
         make_planner("greedy").plan(model.dynamics, task, scene, scene.in_a_row())
 
 
@@ -131,9 +131,9 @@ def test_other_datasets_are_refused_before_training(trained, tmp_path):
     with pytest.raises(BadStore, match="of 3 disks, not 2; a network on the whole"):
         fit("in", (store, three), RECIPE, tmp_path / "both")
     again = RECIPE.changed(start=FromModel(str(folder)))
-    with pytest.raises(BadCheckpoint, match=r"card.json: the network takes 2 disks"):
+    with pytest.raises(BadCheckpoint, match=r"card.json: takes 2 disk\(s\), not"):
         fit("in", three, again, tmp_path / "again")
-    with pytest.raises(BadCheckpoint, match="takes 2 disks, not 3"):
+    with pytest.raises(BadCheckpoint, match="takes 2 disk.s., not 3"):
         evaluate([load_model(str(folder))], three)
     assert not (tmp_path / "both").exists() and not (tmp_path / "again").exists()
 

@@ -138,7 +138,7 @@ def test_shards_give_the_same_numbers(printed, command, tmp_path, capsys):
     [
         (["--shard", "3/2"], "--shard is 3/2; it must be a number and a count"),
         (["--folds", "1"], "folds.*at least 2"),
-        (["--folds", "17"], "32 pushes, 16 to divide by kind, do not fill 17 folds"),
+        (["--folds", "17"], "32 pushes, 16 of them different by kind.* 17 folds"),
         (["--group", "glass"], "no group 'glass'"),
         (["--pushes", "99"], "32 pushes, not 99"),
         (["--table", "errors.doc"], "table.*\\.md"),

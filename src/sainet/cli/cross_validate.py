@@ -34,7 +34,8 @@ class CrossValidate:
     """Folder to write: the fitted models of all folds, measurements and a page. An
     identical call resumes; a call with other settings uses the existing models."""
     by: tuple[Scheme, ...] = ("chain",)
-    """Divisions into folds. kind: repeats of a push stay together. chain: so do pushes
+    """Divisions into folds. kind: repeats of a push stay together, if the dataset
+    states which pushes these are (column kind of a table). chain: so do pushes
     that start where another push ended. place, direction, side (of the disk) and order
     (of recording): test pushes lie in a part that training pushes leave out."""
     folds: int = 5

@@ -18,6 +18,14 @@ from sainet.datasets.store import Store
 from sainet.runs.errors import BadStore
 
 BLOCKED: tuple[Scheme, ...] = ("place", "direction", "side", "order")
+_DIGITS = 6  # of values that are equal
+# Values (m, rad, pushes) that differ by less are one place, direction or side.
+_ALIKE: Mapping[Scheme, float] = {
+    "place": 1e-3,
+    "direction": 0.02,
+    "side": 0.02,
+    "order": 1,
+}
 
 
 def folds_by(
@@ -39,12 +47,14 @@ def folds_by(
         owner, parts = fold_of_push(kinds, count)[rows], len(np.unique(kinds[rows]))
     else:
         part = store.take(rows)
-        owner = _blocks(_values(part, scheme), count)[part.first_alike()]
-        parts = part.info.pushes
-    if len(np.unique(owner)) < count:
+        values, first = _values(part, scheme), part.first_alike()
+        owner = _blocks(values, count)[first]
+        parts = len(np.unique(np.rint(values[first] / _ALIKE[scheme])))
+    if min(parts, len(np.unique(owner))) < count:
+        fewer = "take fewer folds, " if parts > 1 else "take "
         raise BadStore(
-            f"{store.path}: {len(rows)} pushes, {parts} to divide by {scheme}, do not "
-            f"fill {count} folds; take fewer folds, another division or more pushes."
+            f"{store.path}: {len(rows)} pushes, {parts} of them different by {scheme}, "
+            f"do not fill {count} folds; {fewer}another division or more pushes."
         )
     return owner
 
@@ -82,9 +92,11 @@ def _side(arrays: Arrays) -> Float[np.ndarray, " push"]:
 
 
 def _blocks(values: Float[np.ndarray, " push"], count: int) -> Int[np.ndarray, " push"]:
-    """Return the fold of each push: neighbouring values share one, sizes are equal."""
-    order = np.argsort(np.argsort(values, kind="stable"), kind="stable")
-    return order * count // len(values)
+    """Return the fold of each push: neighbours share one, equal values always do."""
+    values = np.round(values, _DIGITS)
+    _, number, sizes = np.unique(values, return_inverse=True, return_counts=True)
+    middle = np.cumsum(sizes) - 1 - sizes // 2  # rank of the middle of equal values
+    return middle[number] * count // len(values)
 
 
 def _longest_axis(places: Float[np.ndarray, "push 2"]) -> Float[np.ndarray, "2"]:

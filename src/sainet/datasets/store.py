@@ -17,7 +17,8 @@ from sainet.datasets.groups import surface_of
 from sainet.runs.digests import BYTES
 from sainet.runs.documents import content_hash, read_document, read_file, readable
 from sainet.runs.errors import BadInput, BadStore, hint, shown
-from sainet.runs.folders import remake
+from sainet.runs.folders import CONFIG, remake
+from sainet.runs.manifest import MANIFEST
 
 
 @dataclass(frozen=True)
@@ -226,6 +227,15 @@ def open_part(path: Path, group: str | None, pushes: int | None = None) -> Store
     return store if pushes is None else store.first(pushes)
 
 
+_UNKNOWN = "the origin of the pushes is unknown; make the dataset in a new folder"
+_NEEDED = {
+    schema.HASHES: "the dataset is unfinished; run the command that made it again to "
+    "resume it",
+    CONFIG: _UNKNOWN,
+    MANIFEST: _UNKNOWN,
+}
+
+
 def open_store(path: Path | str, *, verify: bool = True) -> Store:
     """Return a dataset after checking that nothing is missing or changed.
 
@@ -245,11 +255,9 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
                 f"{folder}: no such dataset; make one with 'sainet generate' or "
                 "'import'."
             )
-        if not (folder / schema.HASHES).exists():
-            raise BadStore(
-                f"{folder / schema.HASHES}: missing, so the dataset is unfinished; run "
-                "the command that made it again to resume it."
-            )
+        for name, why in _NEEDED.items():
+            if not (folder / name).exists():
+                raise BadStore(f"{folder / name}: missing, so {why}.")
     remedy = remake(folder)
     listing = read_document(
         folder / schema.HASHES, schema.Listing, error=BadStore, remedy=remedy

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
 from pathlib import Path
+from types import MappingProxyType
 
 import msgspec
 import numpy as np
@@ -116,21 +117,33 @@ def derive(
         arrays = change(store.read(slice(None)))
         pushes, bodies = arrays["mass"].shape
         info = msgspec.structs.replace(store.info, pushes=pushes, bodies=bodies)
-        write_store(out, info, arrays)
+        write_store(out, info, arrays, known)
     return open_store(out)
 
 
-def write_store(folder: Path, info: schema.StoreInfo, arrays: schema.Arrays) -> None:
-    """Write a store whose arrays are in memory.
+def write_store(
+    out: Path,
+    info: schema.StoreInfo,
+    arrays: schema.Arrays,
+    settings: Mapping[str, object] = MappingProxyType({}),
+) -> None:
+    """Write a store whose arrays are in memory, in a run folder.
+
+    Args:
+        out: the run folder.
+        info: of the store.
+        arrays: of all pushes.
+        settings: JSON values that determine the store.
 
     Raises:
+        RunConflict: the folder belongs to another run.
         BadInput: the disk is full, or a property of the dataset is out of range.
     """
 
     def part(index: int) -> schema.Arrays:
         return {name: a[info.chunk_slice(index)] for name, a in arrays.items()}
 
-    _write(folder, info, part, None)
+    write_once(out, settings, info, part)
 
 
 def _write(

@@ -15,7 +15,7 @@ from sainet.datasets.groups import groups_of
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
-from sainet.learning.process_ends import Ends, ends_of
+from sainet.learning.process_ends import Ends, check_inputs, ends_of
 from sainet.learning.process_fit import fit_to
 from sainet.models.checkpoint import save_arrays
 from sainet.models.correctors import CONFIDENCE
@@ -59,8 +59,8 @@ def fit_process(
         on_output: called after each fit of one output, `fits_of` times.
 
     Raises:
-        BadStore: the pushes do not suffice, or forces drive the pusher.
-        BadInput: an input that was asked for is the same in all pushes.
+        BadStore: the pushes do not suffice, forces drive the pusher, or an input that
+            was asked for is the same in all pushes.
         RunConflict: the folder contains something else.
     """
     check_store(store, settings)
@@ -129,6 +129,7 @@ def check_store(store: Store, settings: ProcessSettings) -> None:
             f"{path}: {kinds} pushes that are not repeats of each other; the "
             f"calibration needs at least {settings.folds}."
         )
+    check_inputs(store, settings.features)
 
 
 class _Fit(NamedTuple):

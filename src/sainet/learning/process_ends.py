@@ -15,7 +15,7 @@ from sainet.models.correctors.process import RESIDUALS, known_inputs, travel_of
 from sainet.models.identity import ProcessFeatures
 from sainet.models.inputs import push_frame
 from sainet.models.process_card import up_to
-from sainet.runs.errors import BadInput, BadStore
+from sainet.runs.errors import BadStore
 from sainet.scenes.recording import AGREES, CameraOffset
 
 # Inputs of each kind of features; every kind has those before it.
@@ -73,17 +73,18 @@ def inputs_of(
 
 
 def check_inputs(store: Store, features: ProcessFeatures) -> None:
-    """Raise `BadInput` if inputs that are asked for are the same in all pushes."""
+    """Raise `BadStore` if inputs that are asked for are the same in all pushes."""
     found = _inputs(to_batch(store.read(slice(None)), store.info))
-    _varying({name: np.asarray(value) for name, value in found.items()}, features)
+    values = {name: np.asarray(value) for name, value in found.items()}
+    _varying(store, values, features)
 
 
 def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -> Ends:
     """Return inputs and residuals of all pushes whose ends were observed.
 
     Raises:
-        BadStore: too few ends were observed.
-        BadInput: an input that was asked for is the same in all pushes.
+        BadStore: too few ends were observed, or an input that was asked for is the
+            same in all pushes.
     """
     prediction = Prediction(internal, store.info)
     arrays = prediction.complete(store.read(slice(None), prediction.names))
@@ -97,7 +98,7 @@ def ends_of(store: Store, internal: InternalEngine, features: ProcessFeatures) -
             "observed; record more."
         )
     inputs = {name: value[known] for name, value in inputs.items()}
-    names = _varying(inputs, features)
+    names = _varying(store, inputs, features)
     values = np.stack([inputs[name] for name in names], axis=1).astype(np.float64)
     rates = rates[known].astype(np.float64)
     kinds = store.repeats()[known]
@@ -131,12 +132,12 @@ def _inputs(batch: PushBatch) -> dict[str, Array]:
 
 
 def _varying(
-    inputs: Mapping[str, np.ndarray], features: ProcessFeatures
+    store: Store, inputs: Mapping[str, np.ndarray], features: ProcessFeatures
 ) -> tuple[str, ...]:
-    """Return the names of the wanted inputs that vary.
+    """Return the names of the wanted inputs that vary in a store.
 
     Raises:
-        BadInput: none of those that were asked for does.
+        BadStore: none of those that were asked for does.
     """
     found: list[str] = []
     for each in up_to(features):
@@ -146,9 +147,10 @@ def _varying(
             if key.startswith(ADDED[each]) and _varies(values)
         ]
         if not varying:
-            raise BadInput(
-                f"`features`: the {_WORDS[each]} is the same in all pushes; record "
-                "other kinds of push, or leave it out."
+            less = ", or fit a Gaussian process without it" * (each != "angle")
+            raise BadStore(
+                f"{store.path}: the {_WORDS[each]} is the same in all pushes; record "
+                f"pushes that differ in it{less}."
             )
         found += varying
     return tuple(found)

@@ -72,6 +72,8 @@ def read_arrays(
     from safetensors import SafetensorError
     from safetensors.numpy import load
 
+    if not path.exists():
+        raise BadCheckpoint(f"{path}: no such file; {remedy}.")
     data = read_file(path, most=_LARGEST, error=BadCheckpoint)
     try:
         found = load(data)

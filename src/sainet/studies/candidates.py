@@ -13,7 +13,6 @@ from sainet.engines.simulator import InternalEngine
 from sainet.learning.ensemble import divided, fit_ensemble
 from sainet.learning.fit import fit
 from sainet.learning.process import check_store, fit_process
-from sainet.learning.process_ends import check_inputs
 from sainet.learning.recipes import RESIDUAL, Recipe
 from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.models.process_card import ProcessSettings
@@ -33,7 +32,7 @@ class Candidate(abc.ABC):
 
     @abc.abstractmethod
     def check(self, store: Store) -> None:
-        """Raise `BadStore` or `BadInput` if the model cannot be fitted to pushes."""
+        """Raise `BadStore` if the model cannot be fitted to pushes."""
 
     @abc.abstractmethod
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
@@ -59,7 +58,6 @@ class ProcessCandidate(Candidate):
     def check(self, store: Store) -> None:
         """Refuse too few pushes, too many disks, and inputs that do not vary."""
         check_store(store, self.settings)
-        check_inputs(store, self.features)
 
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Fit the process."""

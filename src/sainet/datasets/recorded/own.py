@@ -25,10 +25,10 @@ _ANGLE = replace(checks.ANGLE, remedy="in another unit, give `angle_unit`")
 _SAME_PLACE = 1e-6  # m
 COLUMNS = tables.Columns(
     texts=("push", "body"),
-    optional=("group",),
+    optional=("group", "kind"),
     numbers=("time", "x", "y", "angle", "pusher_x", "pusher_y"),
     note=" Columns: push, body, time (s), x, y, pusher_x, pusher_y (m), angle (rad), "
-    "optionally group.",
+    "optionally group and kind.",
 )
 
 
@@ -236,17 +236,18 @@ class _Push:
         return None
 
     def to_recording(self, problems: Problems) -> Recording | None:
-        """Return the recording; None after adding a problem of its group."""
-        surface = ""
-        if "group" in self.table.texts:
-            group, rows = self.table.texts["group"], np.concatenate(self.rows)
-            other = group.code[rows] != group.code[rows[0]]
+        """Return the recording; None after adding a problem of its group or kind."""
+        labels = {"group": "", "kind": ""}
+        rows = np.concatenate(self.rows)
+        for column in filter(self.table.texts.__contains__, [*labels]):
+            text = self.table.texts[column]
+            other = text.code[rows] != text.code[rows[0]]
             if other.any():
                 line = self.table.where(rows[np.argmax(other)])
-                line = f"{line}: {self.name} is in several groups; use one."
-                problems.add("groups", line, of_push=True)
+                line = f"{line}: {self.name} is in several {column}s; use one."
+                problems.add(column, line, of_push=True)
                 return None
-            surface = group.names[group.code[rows[0]]]
+            labels[column] = text.names[text.code[rows[0]]]
         pose = np.stack(
             [
                 np.column_stack([self.column(n, b) for n in ("x", "y", "angle")])
@@ -261,6 +262,7 @@ class _Push:
             time=self.column("time", 0),
             pose=pose,
             pusher=self.pusher(0),
-            conditions=Conditions(surface=surface),
+            conditions=Conditions(surface=labels["group"]),
             source=f"{self.table.path}: {self.name}",
+            plan=labels["kind"] and f"{labels['group']}/{labels['kind']}",
         )

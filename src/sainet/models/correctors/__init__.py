@@ -58,8 +58,8 @@ class Purpose(NamedTuple):
         """Raise `BadCheckpoint` if the corrector takes another number of disks."""
         if self.disks not in (None, disks):
             raise BadCheckpoint(
-                f"{source}: the network takes {self.disks} disks, not {disks}; use an "
-                "interaction network, or train one of this form on such scenes."
+                f"{source}: takes {self.disks} disk(s), not {disks}; use a network for "
+                "any number, or fit such a model to pushes of so many disks."
             )
 
 

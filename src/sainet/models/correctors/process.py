@@ -17,7 +17,6 @@ from sainet.models.correctors import (
     Start,
 )
 from sainet.models.correctors.kernels import KERNELS, KernelName
-from sainet.runs.errors import BadCheckpoint
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import direction, norm, rotate, unit, wrap_angle
 from sainet.scenes.scene import Scene
@@ -154,8 +153,8 @@ class ResidualProcess(AbstractCorrector):
 
     @property
     def made_for(self) -> Purpose:
-        """Pushes along paths."""
-        return Purpose("robot", self.time_step)
+        """Pushes along paths, of as many disks as it was fitted to."""
+        return Purpose("robot", self.time_step, self.reach.shape[0])
 
     @property
     def has_regions(self) -> bool:
@@ -211,12 +210,7 @@ class ResidualProcess(AbstractCorrector):
     def _rates(
         self, scene: Scene, start: Start, heading: Float[Array, " push"]
     ) -> tuple[Float[Array, "push body 3"], Float[Array, "push body 3"]]:
-        disks = self.reach.shape[0]
-        if scene.body_count != disks:
-            raise BadCheckpoint(
-                f"model: its Gaussian process is for pushes of {disks} disk(s), these "
-                f"have {scene.body_count}; fit one to such pushes, or use a network."
-            )
+        self.made_for.check_disks(scene.body_count)
         mean, deviation = self.rates(self.inputs.of(scene, start, heading))
         shape = (-1, scene.body_count, RESIDUALS)
         return mean.reshape(shape), deviation.reshape(shape)
