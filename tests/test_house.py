@@ -348,7 +348,8 @@ LATER = ADDED + modules_of(
 REBUILT = [path for path in MODULES if path not in LATER]
 # Lines in older modules that connect later features to them.
 CONNECTIONS = {
-    "Gaussian processes, regions and coverage": 85,
+    # Three lines stood in evaluation/coverage.py before.
+    "Gaussian processes, regions and coverage": 88,
     "models that abstain": 33,
     "surfaces that change during an episode, choosing pushes in labs": 11,
     "adaptation": 25,
@@ -414,9 +415,10 @@ COUNTS = {
         162,
     ),
     "code lines of models that know how sure they are": (
+        # Regions that are as large as errors nearby: 44 of them.
         lambda: sum(map(code_lines, modules_of(TRUST))),
-        1_275,
-        1_275,
+        1_319,
+        1_319,
     ),
     "code lines of kernels": (
         lambda: sum(map(code_lines, modules_of(KERNELS))),

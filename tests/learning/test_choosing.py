@@ -31,6 +31,8 @@ def fitted_at(points, length=0.5):
         scale=alike,
         centre=np.zeros(points.shape[1]),
         width=np.ones(points.shape[1]),
+        errors=np.ones((len(points), 1, 2)),
+        near=np.ones((1, 2, points.shape[1])),
         reach=np.ones((1, 2)),
         plain=np.ones((1, 2)),
     )

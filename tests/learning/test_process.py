@@ -20,14 +20,14 @@ from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
-from sainet.evaluation.coverage import MISSED, coverage_of, measured
+from sainet.evaluation.coverage import coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
-from sainet.learning.process import fit_process, fits_of, quantile
-from sainet.learning.process_ends import ends_of
+from sainet.learning.process import calibrated_fit, fit_process, fits_of, quantile
+from sainet.learning.process_ends import Ends, ends_of
 from sainet.learning.process_fit import fit_to, loss_and_slope
-from sainet.models.correctors import CONFIDENCE, Region
+from sainet.models.correctors import CONFIDENCE, Region, interval_score
 from sainet.models.correctors.kernels import KERNELS
-from sainet.models.correctors.process import correlation
+from sainet.models.correctors.process import correlation, error_near
 from sainet.models.fitted_process import Fitted, corrector_of, rates_at
 from sainet.models.library import load_model
 from sainet.models.process_card import ARRAYS, PROCESS, ProcessSettings
@@ -103,6 +103,8 @@ def test_mean_and_deviation_are_those_of_the_textbook():
         scale=np.array([1.0, 2.0, 3.0]),
         centre=np.array([0.5, -0.5]),
         width=np.array([2.0, 3.0]),
+        errors=np.ones((12, 1, 2)),
+        near=np.ones((1, 2, 2)),
         reach=np.ones((1, 2)),
         plain=np.ones((1, 2)),
     )
@@ -215,6 +217,53 @@ def test_the_quantile_holds_its_level_for_exchangeable_scores():
     assert (quantile(np.arange(5.0)[:, None, None] + np.zeros((1, 1, 2))) == 4).all()
 
 
+def scattered(pushes: int, seed: int, loud: float) -> Ends:
+    """Ends of one disk that scatter `loud` times as much where input 1 is positive."""
+    rng = np.random.default_rng(seed)
+    inputs = rng.uniform(-1, 1, (pushes, 2))
+    size = np.where(inputs[:, :1] > 0, loud, 1.0)
+    rates = 0.1 * np.sin(3 * inputs).sum(axis=1, keepdims=True)
+    rates = rates + 0.02 * size * rng.normal(size=(pushes, 3))
+    names = ("contact_angle", "place_x")
+    return Ends(names, inputs, rates, np.ones(pushes), np.arange(pushes))
+
+
+def test_regions_are_larger_where_errors_were():
+    """And as large as a loop over pushes says, in the two programs that apply them."""
+    ends, others = scattered(120, 0, loud=5.0), scattered(400, 1, loud=5.0)
+    fitted = calibrated_fit(ends, ProcessSettings(iterations=10), lambda: None).fitted
+    process = corrector_of(fitted, ends.names, 1 / 240)
+    expected = np.asarray(process.expected(jnp.asarray(others.inputs, jnp.float32)))
+    is_loud = others.inputs[:, 0] > 0.2
+    for kind in range(2):
+        loud, quiet = expected[is_loud, 0, kind], expected[~is_loud, 0, kind]
+        assert np.median(loud) > 2 * np.median(quiet)
+    mean, deviation = rates_at(fitted, others.inputs)
+    width = fitted.reach[0, 1] * expected[:, 0, 1] * deviation[:, 2]
+    error = np.abs(others.rates - mean)[:, 2]
+    assert 0.84 < np.mean(error <= width) < 0.96
+    plain = np.full_like(error, fitted.plain[0, 1])
+    assert (
+        interval_score(width, error).mean() < 0.9 * interval_score(plain, error).mean()
+    )
+    points = (others.inputs - fitted.centre) / fitted.width
+    for push in range(5):
+        for kind in range(2):
+            length = fitted.near[0, kind]
+            far = np.linalg.norm((fitted.inputs - points[push]) / length, axis=1)
+            close = (1 + np.sqrt(3) * far) * np.exp(-np.sqrt(3) * far)
+            errors = fitted.errors[:, 0, kind]
+            known = (close @ errors + errors.mean()) / (close.sum() + 1)
+            np.testing.assert_allclose(expected[push, 0, kind], known, rtol=2e-4)
+
+
+def test_where_no_push_is_near_the_mean_error_is_expected():
+    errors = np.array([1.0, 2.0, 6.0])
+    assert error_near(errors, np.zeros((3, 1))) == 3.0
+    assert error_near(errors, np.ones((3, 1))) == 3.0
+    assert error_near(errors, np.array([[1.0], [0.0], [0.0]])) == 2.0
+
+
 def test_interval_scores_are_those_of_the_definition():
     """Along a push to the left, an end 3 mm ahead and 1 mm aside."""
     region = Region(
@@ -226,11 +275,11 @@ def test_interval_scores_are_those_of_the_definition():
     true = np.array([[[-1e-3, 3e-3, 2 * np.pi + 0.25]]])
     found = measured(region, np.zeros((1, 1, 3)), true)
     radius, scaled = 1.0, np.hypot(1.5, 2.0)  # mm; distance in half axes
-    expected = radius + MISSED * (scaled - 1) * radius
+    expected = radius + 10 * (scaled - 1) * radius
     np.testing.assert_allclose(found["score_pos"], expected, rtol=1e-5)
     np.testing.assert_allclose(found["plain_score_pos"], 4.0, rtol=1e-5)
     width, error = np.rad2deg([0.1, 0.25])
-    turned = width + MISSED * (error - width)
+    turned = width + 10 * (error - width)
     np.testing.assert_allclose(found["score_rot"], turned, rtol=1e-5)
     assert found["inside_pos"] == 0
     assert found["inside_rot"] == 0
@@ -324,7 +373,7 @@ def edited(folder, tmp_path, **changes):
         ({"inputs": ["../x"]}, "inputs"),
         ({"seal": ""}, "seal"),
         ({"kind": "direct-force"}, "kind"),
-        ({"format_version": 2}, "format_version"),
+        ({"format_version": 1}, "format_version"),
     ],
 )
 def test_an_edited_card_is_refused(folder, tmp_path, changes, message):

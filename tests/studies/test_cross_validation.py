@@ -198,11 +198,11 @@ def test_the_next_command_makes_a_model_as_it_was_validated():
 
 
 def test_ensembles_and_chosen_processes_are_compared(recorded, tmp_path, monkeypatch):
-    from sainet.studies import candidates
+    from sainet.studies import candidates, recorded_models
 
     monkeypatch.setattr(candidates, "MEMBERS", 2)
-    few = candidates.RESIDUAL.changed(iterations=2)
-    monkeypatch.setattr(candidates, "RESIDUAL", few)
+    few = recorded_models.RESIDUAL.changed(iterations=2)
+    monkeypatch.setattr(recorded_models, "RESIDUAL", few)
     monkeypatch.setattr("sainet.learning.ensemble._FEWEST", 3)
     store = open_store(recorded).of_group("wood")
     models = candidates_named(["sain-ensemble", "gp-side-chosen"])

@@ -35,11 +35,21 @@ def _recorded(folder, pushes):
         has_repeats=True,
     )
     arrays = end_points_alone(made_up(info))
+    for name in ("initial", "truth", "simulated_planar"):
+        _along(arrays[name])
+    for name in ("initial_pusher", "truth_pusher", "command_position"):
+        _along(arrays[name])
     arrays |= {"repeat": np.repeat(np.arange(pushes // 2), 2)}
     arrays |= {"mass": np.ones_like(arrays["mass"])}
     names = ("table_friction", "disk_friction", "pusher_friction")
     arrays |= dict.fromkeys(names, np.full(pushes, 0.3))
     return write(folder / "data", info, arrays).path
+
+
+def _along(places):
+    """Moves each push by 2 mm more than the one before, so that places differ."""
+    shift = 0.002 * np.arange(len(places))
+    places[..., 0] += shift.reshape(-1, *[1] * (places.ndim - 2))
 
 
 @pytest.fixture(scope="module")

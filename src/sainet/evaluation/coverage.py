@@ -17,10 +17,9 @@ from sainet.datasets.batch import PushBatch
 from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.evaluation.metrics import final_pose
-from sainet.models.correctors import CONFIDENCE, Region
+from sainet.models.correctors import CONFIDENCE, Region, interval_score
 from sainet.models.dynamics import AbstractDynamics
 
-MISSED = 1 / (1 - CONFIDENCE)  # penalty for each mm or degree outside
 KINDS = ("pos", "rot")
 UNITS = {"pos": "mm", "rot": "deg"}
 # Names of further measurements of each push, by kind.
@@ -97,13 +96,9 @@ def measured(
     for kind in KINDS:
         found[INSIDE.format(kind)] = (error[kind] <= width[kind]).astype(np.float64)
         found[SIZE.format(kind)] = width[kind]
-        found[SCORE.format(kind)] = _score(width[kind], error[kind])
-        found[PLAIN.format(kind)] = _score(same[kind], whole[kind])
+        found[SCORE.format(kind)] = interval_score(width[kind], error[kind])
+        found[PLAIN.format(kind)] = interval_score(same[kind], whole[kind])
     return found
-
-
-def _score(width: np.ndarray, error: np.ndarray) -> np.ndarray:
-    return width + MISSED * np.maximum(error - width, 0.0)
 
 
 def coverage_of(measured: Measurements) -> list[Coverage]:

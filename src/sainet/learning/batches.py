@@ -33,6 +33,7 @@ def mirror_some(batch: PushBatch, seed: int, iteration: int) -> PushBatch:
     return mirror(batch, jnp.asarray(rng.random(batch.size) < 1 / 2))
 
 
+@jax.jit  # of a hundred small operations
 def mirror(batch: PushBatch, chosen: Bool[Array, " push"]) -> PushBatch:
     """Return the batch with the chosen pushes mirrored at the x axis of the table."""
 

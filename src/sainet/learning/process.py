@@ -9,7 +9,7 @@ from typing import NamedTuple
 import jax
 import msgspec
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sainet.datasets.groups import groups_of
 from sainet.datasets.splits import fold_of_push
@@ -18,9 +18,9 @@ from sainet.engines.simulator import InternalEngine
 from sainet.learning.process_ends import Ends, check_inputs, ends_of
 from sainet.learning.process_fit import fit_to
 from sainet.models.checkpoint import save_arrays
-from sainet.models.correctors import CONFIDENCE
-from sainet.models.correctors.process import BODIES, RESIDUALS
-from sainet.models.fitted_process import Fitted, rates_at
+from sainet.models.correctors import CONFIDENCE, interval_score
+from sainet.models.correctors.process import BODIES, RESIDUALS, error_near
+from sainet.models.fitted_process import Fitted, correlation_between, rates_at
 from sainet.models.identity import ModelId
 from sainet.models.process_card import (
     ARRAYS,
@@ -36,6 +36,8 @@ from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST, Manifest
 
 Identify = Callable[[Path], InternalEngine]
+# Widths of neighbourhoods, in length scales; the last one has all pushes.
+_NEAR = (0.35, 0.5, 0.7, 1.0, 1.5, np.inf)
 ENGINE = "engine"  # folder, inside the run folder, of the engine identified for it
 _log = logging.getLogger(__name__)
 
@@ -147,20 +149,20 @@ def _best_fit(
 ) -> _Fit:
     """Return the fit, of the options, that predicts pushes left out of it best."""
     fits = [
-        _calibrated_fit(ends.with_features(each.features), each, on_output)
+        calibrated_fit(ends.with_features(each.features), each, on_output)
         for each in settings.options
     ]
     return min(fits, key=lambda fit: fit.missed)
 
 
-def _calibrated_fit(
+def calibrated_fit(
     ends: Ends, settings: ProcessSettings, on_output: Callable[[], None]
 ) -> _Fit:
-    """Fit a process, and the factors of deviations that make 90 % regions.
+    """Fit a process, and what makes 90 % regions of its deviations.
 
     Conformal prediction over folds: whole kinds of push are left out of the fit that
     predicts them. Its optimiser begins at the parameters of the whole fit. `plain` is
-    the same for regions of one size everywhere.
+    for regions of one size everywhere.
     """
     fitted, loss = fit_to(ends, settings, on_output)
     owner = fold_of_push(ends.kinds, settings.folds, settings.seed)
@@ -172,9 +174,10 @@ def _calibrated_fit(
         part, _ = fit_to(ends.take(~held), settings, on_output, begin)
         mean, deviation[held] = rates_at(part, ends.inputs[held])
         off[held] = ends.rates[held] - mean
-    missed = _sizes(off)
+    missed, errors = _sizes(off), _sizes(off / deviation)
+    near, reach = _neighbourhoods(fitted, errors, _areas(deviation), owner)
     calibrated = replace(
-        fitted, reach=quantile(_sizes(off / deviation)), plain=quantile(missed)
+        fitted, errors=errors, near=near, reach=reach, plain=quantile(missed)
     )
     left = missed.mean(axis=0) / _sizes(ends.rates).mean(axis=0)
     return _Fit(settings, ends.names, calibrated, loss, float(left.mean()))
@@ -186,7 +189,50 @@ def _sizes(off: Float[np.ndarray, "push output"]) -> Float[np.ndarray, "push bod
     return np.stack([np.hypot(off[..., 0], off[..., 1]), np.abs(off[..., 2])], axis=-1)
 
 
-def quantile(scores: Float[np.ndarray, "push body 2"]) -> Float[np.ndarray, "body 2"]:
+def _areas(
+    deviation: Float[np.ndarray, "push output"],
+) -> Float[np.ndarray, "push body 2"]:
+    """Return the radius of the circle of an ellipse's area, and the half width."""
+    each = deviation.reshape(len(deviation), -1, RESIDUALS)
+    return np.stack([np.sqrt(each[..., 0] * each[..., 1]), each[..., 2]], axis=-1)
+
+
+def _neighbourhoods(
+    fitted: Fitted,
+    errors: Float[np.ndarray, "push body 2"],
+    sizes: Float[np.ndarray, "push body 2"],
+    owner: Int[np.ndarray, " push"],
+) -> tuple[Float[np.ndarray, "body 2 input"], Float[np.ndarray, "body 2"]]:
+    """Return how far an error tells of other pushes, and the factors of regions.
+
+    An error is expected to be the mean of those on pushes near it, of other folds. Of
+    several widths, the one is taken whose regions have the least interval score.
+
+    Args:
+        fitted: the process.
+        errors: on pushes left out of a fit, in standard deviations.
+        sizes: of one standard deviation, for each metre of travel.
+        owner: fold of each push.
+    """
+    lengths = fitted.length.reshape(-1, RESIDUALS, fitted.length.shape[1])
+    lengths = np.stack([np.sqrt(lengths[:, 0] * lengths[:, 1]), lengths[:, 2]], axis=1)
+    near, reach = np.empty_like(lengths), np.empty(lengths.shape[:2])
+    apart = owner[:, None] != owner[None]
+    for place in np.ndindex(reach.shape):
+        found, size = errors[:, *place], sizes[:, *place]
+        best = np.inf
+        for length in np.multiply.outer(_NEAR, lengths[place]):
+            points = fitted.inputs / length
+            close = correlation_between(fitted.kernel, points, points)
+            expected = error_near(found, close * apart)
+            (factor,) = quantile((found / expected)[:, None])
+            score = interval_score(factor * expected * size, found * size).mean()
+            if score < best:
+                best, reach[place], near[place] = score, factor, length
+    return near, reach
+
+
+def quantile(scores: Float[np.ndarray, "push *rest"]) -> Float[np.ndarray, "*rest"]:
     """Return the conformal quantile, below which `CONFIDENCE` of new scores lie."""
     count = len(scores)
     rank = min(count, int(np.ceil(CONFIDENCE * (count + 1))))

@@ -57,7 +57,7 @@ def fit_to(
         found.append(np.exp(best[0]))
         losses.append(best[1] / len(some))
         on_output()
-    parameters = np.stack(found)
+    parameters, bodies = np.stack(found), len(outputs) // RESIDUALS
     fitted = Fitted(
         inputs=inputs,
         outputs=outputs,
@@ -68,8 +68,10 @@ def fit_to(
         scale=scale,
         centre=centre,
         width=width,
-        reach=np.ones((len(outputs) // RESIDUALS, 2)),
-        plain=np.ones((len(outputs) // RESIDUALS, 2)),
+        errors=np.ones((len(inputs), bodies, 2)),
+        near=np.full((bodies, 2, inputs.shape[1]), np.inf),
+        reach=np.ones((bodies, 2)),
+        plain=np.ones((bodies, 2)),
         kernel=settings.kernel,
     )
     return fitted, float(np.mean(losses))

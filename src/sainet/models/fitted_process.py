@@ -32,6 +32,8 @@ class Fitted(eqx.Module):
     scale: Float[np.ndarray, " output"]
     centre: Float[np.ndarray, " input"]
     width: Float[np.ndarray, " input"]
+    errors: Float[np.ndarray, "push body 2"]
+    near: Float[np.ndarray, "body 2 input"]
     reach: Float[np.ndarray, "body 2"]
     plain: Float[np.ndarray, "body 2"]
     kernel: KernelName = eqx.field(static=True, default="matern-3/2")
@@ -59,7 +61,7 @@ def corrector_of(
         kernel=fitted.kernel,
         **{name: single(getattr(fitted, name)) for name in same},
     )
-    same = ("centre", "width", "reach", "plain")
+    same = ("centre", "width", "errors", "near", "reach", "plain")
     return ResidualProcess(
         process,
         inputs=Inputs(inputs),
@@ -81,9 +83,19 @@ def covariance_between(
     other: Float[np.ndarray, "other input"],
 ) -> Float[np.ndarray, "one other"]:
     """Return the prior covariance of an output at standardised inputs, no noise."""
-    length, (factor, of) = fitted.length[output], KERNELS[fitted.kernel]
-    far = np.sqrt(factor * squared_distances(one / length, other / length))
-    return fitted.amplitude[output] ** 2 * of(far, np.exp)[0]
+    length = fitted.length[output]
+    near = correlation_between(fitted.kernel, one / length, other / length)
+    return fitted.amplitude[output] ** 2 * near
+
+
+def correlation_between(
+    kernel: KernelName,
+    one: Float[np.ndarray, "one input"],
+    other: Float[np.ndarray, "other input"],
+) -> Float[np.ndarray, "one other"]:
+    """Return the prior correlation of points whose length scales are 1."""
+    factor, of = KERNELS[kernel]
+    return of(np.sqrt(factor * squared_distances(one, other)), np.exp)[0]
 
 
 def squared_distances(
@@ -143,6 +155,8 @@ def read_process(folder: Path) -> tuple[Fitted, ProcessCard]:
         scale=np.empty(outputs),
         centre=np.empty(inputs),
         width=np.empty(inputs),
+        errors=np.empty((pushes, card.disks, 2)),
+        near=np.empty((card.disks, 2, inputs)),
         reach=np.empty((card.disks, 2)),
         plain=np.empty((card.disks, 2)),
         kernel=card.recipe.kernel,

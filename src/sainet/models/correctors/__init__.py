@@ -4,6 +4,7 @@ from abc import abstractmethod
 from typing import NamedTuple
 
 import equinox as eqx
+import numpy as np
 from jaxtyping import Array, Float
 
 from sainet.models.inputs import PushFrame
@@ -31,6 +32,14 @@ class Prediction(eqx.Module):
 
 
 CONFIDENCE = 0.9  # probability that a region holds the end of a push
+
+
+def interval_score(width: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Return half the interval score of Gneiting and Raftery (2007), smaller is better.
+
+    It is the half width of an interval, plus ten times what an error lies outside.
+    """
+    return width + np.maximum(error - width, 0.0) / (1 - CONFIDENCE)
 
 
 class Region(NamedTuple):

@@ -5,6 +5,8 @@ process of the start of the push: a kernel with one length scale for each input,
 It grows in proportion to the travel of the pusher, and has a value at every step.
 """
 
+from typing import cast
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -16,7 +18,7 @@ from sainet.models.correctors import (
     Region,
     Start,
 )
-from sainet.models.correctors.kernels import KERNELS, KernelName
+from sainet.models.correctors.kernels import KERNELS, KernelName, T
 from sainet.scenes.controls import Controls
 from sainet.scenes.geometry import direction, norm, rotate, unit, wrap_angle
 from sainet.scenes.scene import Scene
@@ -138,14 +140,28 @@ def correlation(
     return of(far, jnp.exp)[0]
 
 
+def error_near(errors: T, close: T) -> T:
+    """Return the mean error near each push; the mean of all counts as one neighbour.
+
+    Args:
+        errors: ``[known]``, on known pushes.
+        close: ``[known, push]``, from 0 to 1.
+    """
+    return cast(T, (errors @ close + errors.mean()) / (close.sum(axis=0) + 1))
+
+
 class ResidualProcess(AbstractCorrector):
     """Adds the residual that a Gaussian process expects to a simulator prediction."""
 
     process: Process
     centre: Float[Array, " input"]
     width: Float[Array, " input"]  # inputs are centred, then divided by it
-    # Of 90 % regions of position and rotation: factors of the standard deviations, and
-    # sizes that are the same for all pushes (m, rad, for each metre of travel).
+    # Of position and rotation: errors on the pushes, each left out of a fit, in
+    # standard deviations; and length scales of how far they tell of other pushes.
+    errors: Float[Array, "push body 2"]
+    near: Float[Array, "body 2 input"]
+    # Of 90 % regions of position and rotation: factors of the errors that are expected,
+    # and sizes that are the same for all pushes (m, rad, for each metre of travel).
     reach: Float[Array, "body 2"]
     plain: Float[Array, "body 2"]
     inputs: Inputs
@@ -194,12 +210,28 @@ class ResidualProcess(AbstractCorrector):
         travel, heading = travel_of(controls, start.predicted)
         whole = travel.sum(axis=1)[:, None, None]
         grown = self._rates(scene, start, heading)[1] * whole
+        reach = self.reach[None] * self.expected(self.inputs.of(scene, start, heading))
         return Region(
             heading=heading,
-            axes=self.reach[None, :, :1] * grown[..., :2],
-            turn=self.reach[None, :, 1] * grown[..., 2],
+            axes=reach[..., :1] * grown[..., :2],
+            turn=reach[..., 1] * grown[..., 2],
             plain=self.plain[None] * whole,
         )
+
+    def expected(
+        self, inputs: Float[Array, "push input"]
+    ) -> Float[Array, "push body 2"]:
+        """Return the error that is expected of each push, in standard deviations."""
+        points = (inputs - self.centre[None]) / self.width[None]
+        known, kernel = self.process.inputs, self.process.kernel
+        lengths = self.near.reshape(-1, 1, known.shape[1])
+        found = [
+            error_near(errors, correlation(kernel, known / length, points / length))
+            for errors, length in zip(
+                self.errors.reshape(len(known), -1).T, lengths, strict=True
+            )
+        ]
+        return jnp.stack(found, axis=-1).reshape(len(points), -1, 2)
 
     def rates(
         self, inputs: Float[Array, "push input"]
