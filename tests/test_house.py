@@ -375,7 +375,7 @@ CONNECTIONS = {
     "inputs between those by the letter and ours": 20,
     "steering of rows": 29,
     "screening of pushes": 20,
-    "timing starts, processes loaded on demand": 7,
+    "timing starts and own pushes, processes loaded on demand": 12,
     "pushes in two datasets, a split into another run": 14,
     "kinds of pushes in own tables, origins of datasets": 17,
     # Shares of datasets, trials and evaluations, the options of five commands, and

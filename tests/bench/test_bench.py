@@ -280,8 +280,8 @@ def test_a_case_without_runs_is_bad_input(name):
 def test_figures_of_several_cases_are_separate_objects(monkeypatch):
     ran, alone = [], {"bullet_ratio": 2.0}
 
-    def slow_case():
-        ran.append(1)
+    def slow_case(runs=5):
+        ran.append(runs)
         return alone
 
     monkeypatch.setattr("sainet.cli.bench.use_devices", lambda count: None)
@@ -293,7 +293,11 @@ def test_figures_of_several_cases_are_separate_objects(monkeypatch):
     assert Bench(cases=("planning",), output=quiet).run() == alone
     with pytest.raises(UnknownName, match="plannin"):
         Bench(cases=("engines", "plannin"), output=quiet).run()
-    assert len(ran) == 3  # nothing is measured when a name is wrong
+    assert ran == [5] * 3  # nothing is measured when a name is wrong
+    Bench(cases=("planning",), runs=2, output=quiet).run()
+    assert ran[-1] == 2
+    with pytest.raises(BadInput, match="`runs` is 0"):
+        Bench(cases=("commands",), runs=0, output=quiet).run()
 
 
 def test_whole_commands_run_to_their_end_in_a_folder_of_their_own(tmp_path):

@@ -19,13 +19,16 @@ from sainet.cli.output import Json, Output
 if TYPE_CHECKING:
     from sainet.bench import Figures
 
-# In this order: the training run reads the pushes of the second command.
+# In this order: later commands read the pushes of earlier ones.
 COMMANDS = (
     "sainet --help",
     "sainet generate robot --pushes 4500 --out pushes",
     "sainet generate robot --pushes 4500 --engine bullet "
     "--assumed-engine bullet planar --out bullet",
     "sainet train sain --data pushes --out network",
+    "sainet generate robot --disks 1 --pushes 500 --out own",
+    "sainet tune gp --data own --out gp",
+    "sainet cross-validate --data own --pushes 300 --out validated",
     "sainet demo --out demo",
 )
 _WHOLE = {"commands": "sainet.cli.bench:bench_commands"}
@@ -64,6 +67,8 @@ class Bench:
     cases: Positional[tuple[str, ...]] = ()
     """Benchmark cases: training, engines, planning, screening, disks, environments,
     start, and commands, which takes an hour. Default: all but commands."""
+    runs: int | None = None
+    """Number of measurements of each case. Default: as docs/benchmarks.md states."""
     devices: int | None = None
     """Number of CPU devices that share a batch. Default: one per core."""
     output: Output = field(default_factory=Output)
@@ -87,7 +92,7 @@ class Bench:
         figures: dict[str, Figures] = {}
         for name, case in cases.items():
             self.output.say(f"Measuring {name} ...")
-            figures[name] = case()
+            figures[name] = case() if self.runs is None else case(self.runs)
             for key, value in figures[name].items():
                 line = Text(f"  {key}: {value}")  # a value may look like markup
                 self.output.console.print(line, soft_wrap=True)
