@@ -257,6 +257,23 @@ def test_regions_are_larger_where_errors_were():
             np.testing.assert_allclose(expected[push, 0, kind], known, rtol=2e-4)
 
 
+def test_regions_are_alike_where_errors_are():
+    """Some fits to pushes that scatter alike have neighbourhoods of all pushes."""
+    settings, widest = ProcessSettings(iterations=10), 0
+    for seed in range(6):
+        ends = scattered(30, seed, loud=1.0)
+        fitted = calibrated_fit(ends, settings, lambda: None).fitted
+        assert np.isfinite(fitted.near).all()  # else the file could not be read
+        process = corrector_of(fitted, ends.names, 1 / 240)
+        expected = process.expected(jnp.asarray(ends.inputs, jnp.float32))
+        for kind in range(2):
+            if (fitted.near[0, kind] > 1e4).all():
+                mean = fitted.errors[:, 0, kind].mean()
+                np.testing.assert_allclose(expected[:, 0, kind], mean, rtol=1e-4)
+                widest += 1
+    assert widest > 0
+
+
 def test_where_no_push_is_near_the_mean_error_is_expected():
     errors = np.array([1.0, 2.0, 6.0])
     assert error_near(errors, np.zeros((3, 1))) == 3.0

@@ -36,8 +36,8 @@ from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST, Manifest
 
 Identify = Callable[[Path], InternalEngine]
-# Widths of neighbourhoods, in length scales; the last one has all pushes.
-_NEAR = (0.35, 0.5, 0.7, 1.0, 1.5, np.inf)
+# Widths of neighbourhoods, in length scales; in the last one all pushes count alike.
+_NEAR = (0.35, 0.5, 0.7, 1.0, 1.5, 1e6)
 ENGINE = "engine"  # folder, inside the run folder, of the engine identified for it
 _log = logging.getLogger(__name__)
 

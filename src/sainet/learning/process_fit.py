@@ -69,7 +69,7 @@ def fit_to(
         centre=centre,
         width=width,
         errors=np.ones((len(inputs), bodies, 2)),
-        near=np.full((bodies, 2, inputs.shape[1]), np.inf),
+        near=np.ones((bodies, 2, inputs.shape[1])),
         reach=np.ones((bodies, 2)),
         plain=np.ones((bodies, 2)),
         kernel=settings.kernel,
