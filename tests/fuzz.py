@@ -219,7 +219,7 @@ def make_recorded(out: Path) -> None:
     arrays["repeat"] = np.arange(6) // 2
     groups = ("felt", "ice")
     info = structs.replace(store.info, engine="recorded", groups=groups, seed=None)
-    shutil.rmtree(out / "pushes.zarr")
+    shutil.rmtree(out)
     write_store(out, structs.replace(info, has_repeats=True), arrays)
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from contextlib import suppress
 from pathlib import Path
-from types import MappingProxyType
 
 import msgspec
 import numpy as np
@@ -125,7 +124,7 @@ def write_store(
     out: Path,
     info: schema.StoreInfo,
     arrays: schema.Arrays,
-    settings: Mapping[str, object] = MappingProxyType({}),
+    settings: Mapping[str, object] | None = None,
 ) -> None:
     """Write a store whose arrays are in memory, in a run folder.
 
@@ -133,7 +132,7 @@ def write_store(
         out: the run folder.
         info: of the store.
         arrays: of all pushes.
-        settings: JSON values that determine the store.
+        settings: JSON values that determine the store; None: nothing else does.
 
     Raises:
         RunConflict: the folder belongs to another run.
@@ -143,7 +142,8 @@ def write_store(
     def part(index: int) -> schema.Arrays:
         return {name: a[info.chunk_slice(index)] for name, a in arrays.items()}
 
-    write_once(out, settings, info, part)
+    run = open_run(out, settings or {}, finished_by=schema.HASHES)
+    _write(run.path, info, part, None)
 
 
 def _write(
