@@ -218,7 +218,7 @@ def test_the_quantile_holds_its_level_for_exchangeable_scores():
 
 
 def scattered(pushes: int, seed: int, loud: float) -> Ends:
-    """Ends of one disk that scatter `loud` times as much where input 1 is positive."""
+    """Ends that scatter `loud` times as much where the first input is positive."""
     rng = np.random.default_rng(seed)
     inputs = rng.uniform(-1, 1, (pushes, 2))
     size = np.where(inputs[:, :1] > 0, loud, 1.0)
@@ -229,7 +229,7 @@ def scattered(pushes: int, seed: int, loud: float) -> Ends:
 
 
 def test_regions_are_larger_where_errors_were():
-    """And as large as a loop over pushes says, in the two programs that apply them."""
+    """A loop over the pushes gives the same sizes."""
     ends, others = scattered(120, 0, loud=5.0), scattered(400, 1, loud=5.0)
     fitted = calibrated_fit(ends, ProcessSettings(iterations=10), lambda: None).fitted
     process = corrector_of(fitted, ends.names, 1 / 240)

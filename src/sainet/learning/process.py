@@ -203,10 +203,10 @@ def _neighbourhoods(
     sizes: Float[np.ndarray, "push body 2"],
     owner: Int[np.ndarray, " push"],
 ) -> tuple[Float[np.ndarray, "body 2 input"], Float[np.ndarray, "body 2"]]:
-    """Return how far an error tells of other pushes, and the factors of regions.
+    """Return the length scales of neighbourhoods, and the factors of regions.
 
-    An error is expected to be the mean of those on pushes near it, of other folds. Of
-    several widths, the one is taken whose regions have the least interval score.
+    The error of a push is expected to be the mean error of the pushes near it, of other
+    folds. Of several widths, that with the smallest mean interval score is taken.
 
     Args:
         fitted: the process.

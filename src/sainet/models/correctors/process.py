@@ -141,7 +141,7 @@ def correlation(
 
 
 def error_near(errors: T, close: T) -> T:
-    """Return the mean error near each push; the mean of all counts as one neighbour.
+    """Return the mean error near each push; the mean of all counts as one push more.
 
     Args:
         errors: ``[known]``, on known pushes.
@@ -157,7 +157,7 @@ class ResidualProcess(AbstractCorrector):
     centre: Float[Array, " input"]
     width: Float[Array, " input"]  # inputs are centred, then divided by it
     # Of position and rotation: errors on the pushes, each left out of a fit, in
-    # standard deviations; and length scales of how far they tell of other pushes.
+    # standard deviations; and the length scales within which pushes are near.
     errors: Float[Array, "push body 2"]
     near: Float[Array, "body 2 input"]
     # Of 90 % regions of position and rotation: factors of the errors that are expected,
