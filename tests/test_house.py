@@ -415,10 +415,11 @@ COUNTS = {
         162,
     ),
     "code lines of models that know how sure they are": (
-        # Regions that are as large as errors nearby: 44 of them.
+        # Regions that are as large as errors nearby: 44 of them; the share of a
+        # residual that is added: 25.
         lambda: sum(map(code_lines, modules_of(TRUST))),
-        1_319,
-        1_319,
+        1_344,
+        1_344,
     ),
     "code lines of kernels": (
         lambda: sum(map(code_lines, modules_of(KERNELS))),

@@ -22,7 +22,13 @@ from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
-from sainet.learning.process import calibrated_fit, fit_process, fits_of, quantile
+from sainet.learning.process import (
+    calibrated_fit,
+    fit_process,
+    fits_of,
+    quantile,
+    share_of,
+)
 from sainet.learning.process_ends import Ends, ends_of
 from sainet.learning.process_fit import fit_to, loss_and_slope
 from sainet.models.correctors import CONFIDENCE, Region, interval_score
@@ -101,6 +107,7 @@ def test_mean_and_deviation_are_those_of_the_textbook():
         noise=np.array([0.1, 0.2, 0.3]),
         mean=np.array([0.1, 0.2, 0.3]),
         scale=np.array([1.0, 2.0, 3.0]),
+        share=np.array([0.25, 1.0, 0.0]),
         centre=np.array([0.5, -0.5]),
         width=np.array([2.0, 3.0]),
         errors=np.ones((12, 1, 2)),
@@ -116,6 +123,7 @@ def test_mean_and_deviation_are_those_of_the_textbook():
             for output in range(3):
                 known = naive_posterior(fitted, output, at)
                 expected = fitted.mean[output] + fitted.scale[output] * known[0]
+                expected *= fitted.share[output]
                 np.testing.assert_allclose(mean[push, output], expected, atol=error)
                 wide = fitted.scale[output] * np.sqrt(known[1])
                 np.testing.assert_allclose(deviation[push, output], wide, rtol=error)
@@ -215,6 +223,34 @@ def test_the_quantile_holds_its_level_for_exchangeable_scores():
         held.append(scores[-1] <= quantile(scores[:-1]))
     assert abs(np.mean(held) - CONFIDENCE) < 0.03
     assert (quantile(np.arange(5.0)[:, None, None] + np.zeros((1, 1, 2))) == 4).all()
+
+
+def test_the_share_has_the_smallest_squared_errors():
+    rng = np.random.default_rng(0)
+    rates = rng.normal(size=(40, 6))
+    predicted = rng.uniform(-0.3, 2.0, 6) * rates + rng.normal(size=(40, 6))
+    shares = np.linspace(0, 1, 2001)
+    off = rates - shares[:, None, None] * predicted
+    squares = np.sum(off**2, axis=1)
+    for which in ([0, 1], [2], [3, 4], [5]):
+        best = shares[np.argmin(squares[:, which].sum(axis=1))]
+        np.testing.assert_allclose(share_of(predicted, rates)[which], best, atol=3e-4)
+    assert (share_of(-rates, rates) == 0).all()
+    assert (share_of(0 * rates, rates) == 0).all()
+    assert (share_of(rates / 2, rates) == 1).all()
+
+
+def test_little_is_added_where_there_is_nothing_to_learn():
+    rng, settings = np.random.default_rng(0), ProcessSettings(iterations=10)
+    shares = []
+    for seed in range(8):
+        ends = scattered(25, seed, loud=1.0)
+        rates = 0.02 * rng.normal(size=ends.rates.shape)
+        pure = replace(ends, rates=rates)
+        shares.append(calibrated_fit(pure, settings, lambda: None).fitted.share)
+        known = calibrated_fit(scattered(200, seed, 1.0), settings, lambda: None)
+        assert (known.fitted.share > 0.9).all()
+    assert np.mean(shares) < 0.25
 
 
 def scattered(pushes: int, seed: int, loud: float) -> Ends:
@@ -390,7 +426,7 @@ def edited(folder, tmp_path, **changes):
         ({"inputs": ["../x"]}, "inputs"),
         ({"seal": ""}, "seal"),
         ({"kind": "direct-force"}, "kind"),
-        ({"format_version": 1}, "format_version"),
+        ({"format_version": 2}, "format_version"),
     ],
 )
 def test_an_edited_card_is_refused(folder, tmp_path, changes, message):
@@ -492,13 +528,14 @@ def test_a_choice_takes_the_best_on_pushes_left_out(store, tmp_path):
 
     def missed(settings):
         ends = ends_of(some, PLANAR, settings.features)
-        owner, off = fold_of_push(ends.kinds, 2, 0), np.empty_like(ends.rates)
+        owner, mean = fold_of_push(ends.kinds, 2, 0), np.empty_like(ends.rates)
         whole, _ = fit_to(ends, settings)
         at = np.log(np.c_[whole.amplitude, np.sqrt(whole.noise), whole.length])
         for fold in range(2):
             part, _ = fit_to(ends.take(owner != fold), settings, begin=at)
             held = owner == fold
-            off[held] = ends.rates[held] - rates_at(part, ends.inputs[held])[0]
+            mean[held] = rates_at(part, ends.inputs[held])[0]
+        off = ends.rates - share_of(mean, ends.rates) * mean
         off, whole = (x.reshape(len(x), 2, 3) for x in (off, ends.rates))
         place = np.hypot(*off.T[:2]).mean(axis=1) / np.hypot(*whole.T[:2]).mean(axis=1)
         turned = np.abs(off[..., 2]).mean(axis=0) / np.abs(whole[..., 2]).mean(axis=0)

@@ -18,7 +18,7 @@ from sainet.engines.simulator import InternalEngine
 from sainet.learning.fit import complete
 from sainet.learning.job import Job, begin
 from sainet.learning.log import read_log
-from sainet.learning.process import quantile
+from sainet.learning.process import quantile, sizes_of
 from sainet.learning.recipes import Recipe, SingleSteps
 from sainet.learning.together import fit_together
 from sainet.models.ensemble import Ensemble
@@ -173,17 +173,16 @@ def _calibrate(dynamics: Ensemble, camera: CameraOffset, held: Store) -> _Calibr
     floor = np.maximum(floor, _TINY)
     scaled = missed / np.sqrt(spread**2 + floor[:, [0, 0, 1]] ** 2)
 
-    def sizes(off: np.ndarray) -> Float[np.ndarray, "push body 2"]:
-        place = np.hypot(off[..., 0], off[..., 1])
-        return np.maximum(np.stack([place, np.abs(off[..., 2])], axis=-1), _TINY)
-
-    def listed(values: np.ndarray) -> tuple[tuple[float, float], ...]:
+    def listed(values: np.ndarray) -> tuple[Pair, ...]:
         return tuple((float(one), float(other)) for one, other in values)
+
+    def within(off: np.ndarray) -> tuple[Pair, ...]:
+        return listed(quantile(np.maximum(sizes_of(off), _TINY)))
 
     return _Calibrated(
         floor=listed(floor),
-        reach=listed(quantile(sizes(scaled))),
-        plain=listed(quantile(sizes(missed))),
+        reach=within(scaled),
+        plain=within(missed),
         calibrated_on=len(missed),
     )
 

@@ -38,6 +38,7 @@ from sainet.runs.manifest import MANIFEST, Manifest
 Identify = Callable[[Path], InternalEngine]
 # Widths of neighbourhoods, in length scales; in the last one all pushes count alike.
 _NEAR = (0.35, 0.5, 0.7, 1.0, 1.5, 1e6)
+_TINY = 1e-30  # less than any sum of squared predictions but zero
 ENGINE = "engine"  # folder, inside the run folder, of the engine identified for it
 _log = logging.getLogger(__name__)
 
@@ -158,32 +159,58 @@ def _best_fit(
 def calibrated_fit(
     ends: Ends, settings: ProcessSettings, on_output: Callable[[], None]
 ) -> _Fit:
-    """Fit a process, and what makes 90 % regions of its deviations.
+    """Fit a process, the share of it to add, and what makes 90 % regions.
 
-    Conformal prediction over folds: whole kinds of push are left out of the fit that
-    predicts them. Its optimiser begins at the parameters of the whole fit. `plain` is
-    for regions of one size everywhere.
+    All follow from predictions over folds: whole kinds of push are left out of the fit
+    that predicts them. Its optimiser begins at the parameters of the whole fit. `plain`
+    is for regions of one size everywhere.
     """
     fitted, loss = fit_to(ends, settings, on_output)
     owner = fold_of_push(ends.kinds, settings.folds, settings.seed)
     noise = np.sqrt(fitted.noise)
     begin = np.log(np.column_stack([fitted.amplitude, noise, fitted.length]))
-    off, deviation = np.empty_like(ends.rates), np.empty_like(ends.rates)
+    mean, deviation = np.empty_like(ends.rates), np.empty_like(ends.rates)
     for fold in range(settings.folds):
         held = owner == fold
         part, _ = fit_to(ends.take(~held), settings, on_output, begin)
-        mean, deviation[held] = rates_at(part, ends.inputs[held])
-        off[held] = ends.rates[held] - mean
-    missed, errors = _sizes(off), _sizes(off / deviation)
+        mean[held], deviation[held] = rates_at(part, ends.inputs[held])
+    share = share_of(mean, ends.rates)
+    off = ends.rates - share * mean
+    missed, errors = sizes_of(off), sizes_of(off / deviation)
     near, reach = _neighbourhoods(fitted, errors, _areas(deviation), owner)
     calibrated = replace(
-        fitted, errors=errors, near=near, reach=reach, plain=quantile(missed)
+        fitted,
+        share=share,
+        errors=errors,
+        near=near,
+        reach=reach,
+        plain=quantile(missed),
     )
-    left = missed.mean(axis=0) / _sizes(ends.rates).mean(axis=0)
+    left = missed.mean(axis=0) / sizes_of(ends.rates).mean(axis=0)
     return _Fit(settings, ends.names, calibrated, loss, float(left.mean()))
 
 
-def _sizes(off: Float[np.ndarray, "push output"]) -> Float[np.ndarray, "push body 2"]:
+def share_of(
+    predicted: Float[np.ndarray, "push output"], rates: Float[np.ndarray, "push output"]
+) -> Float[np.ndarray, " output"]:
+    """Return the share of predictions, from 0 to 1, with the smallest squared errors.
+
+    One for the position of a body and one for its rotation. From few pushes a process
+    learns residuals that are not there; the share says how much of them to add.
+    """
+    bodies = rates.shape[1] // RESIDUALS
+    first = np.add.outer(RESIDUALS * np.arange(bodies), [0, 2]).ravel()
+    products, squares = (
+        np.add.reduceat(np.sum(predicted * other, axis=0), first)
+        for other in (rates, predicted)
+    )
+    best = np.clip(products / np.maximum(squares, _TINY), 0.0, 1.0)
+    return np.repeat(best, [2, 1] * bodies)
+
+
+def sizes_of(
+    off: Float[np.ndarray, "push *output"],
+) -> Float[np.ndarray, "push body 2"]:
     """Return the sizes of errors of position and of rotation."""
     off = off.reshape(len(off), -1, RESIDUALS)
     return np.stack([np.hypot(off[..., 0], off[..., 1]), np.abs(off[..., 2])], axis=-1)

@@ -66,6 +66,7 @@ def fit_to(
         noise=parameters[:, 1] ** 2,
         mean=mean,
         scale=scale,
+        share=np.ones(len(outputs)),
         centre=centre,
         width=width,
         errors=np.ones((len(inputs), bodies, 2)),

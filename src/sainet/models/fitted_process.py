@@ -30,6 +30,7 @@ class Fitted(eqx.Module):
     noise: Float[np.ndarray, " output"]
     mean: Float[np.ndarray, " output"]
     scale: Float[np.ndarray, " output"]
+    share: Float[np.ndarray, " output"]  # of the residual, from 0 to 1, that is added
     centre: Float[np.ndarray, " input"]
     width: Float[np.ndarray, " input"]
     errors: Float[np.ndarray, "push body 2"]
@@ -47,15 +48,16 @@ def corrector_of(
     for output, values in enumerate(fitted.outputs):
         covariance = covariance_of(fitted, output)
         factor = cholesky(covariance, lower=True)
-        weights.append(cho_solve((factor, True), values))
+        weights.append(fitted.share[output] * cho_solve((factor, True), values))
         unit = np.eye(len(values))
         whitening.append(solve_triangular(factor, unit, lower=True))
 
     def single(value: np.ndarray) -> jax.Array:
         return jnp.asarray(value, jnp.float32)
 
-    same = ("inputs", "amplitude", "length", "noise", "mean", "scale")
+    same = ("inputs", "amplitude", "length", "noise", "scale")
     process = Process(
+        mean=single(fitted.share * fitted.mean),
         weights=single(np.stack(weights)),
         whitening=single(np.stack(whitening)),
         kernel=fitted.kernel,
@@ -123,7 +125,8 @@ def rates_at(
         left = fitted.amplitude[output] ** 2 - np.sum(white**2, axis=0)
         deviations[:, output] = np.sqrt(np.maximum(left, 0) + fitted.noise[output])
         means[:, output] = across.T @ cho_solve((factor, True), values)
-    return fitted.mean + fitted.scale * means, fitted.scale * deviations
+    means = fitted.share * (fitted.mean + fitted.scale * means)
+    return means, fitted.scale * deviations
 
 
 def load_process(folder: Path) -> tuple[ResidualProcess, ProcessCard]:
@@ -153,6 +156,7 @@ def read_process(folder: Path) -> tuple[Fitted, ProcessCard]:
         noise=np.empty(outputs),
         mean=np.empty(outputs),
         scale=np.empty(outputs),
+        share=np.empty(outputs),
         centre=np.empty(inputs),
         width=np.empty(inputs),
         errors=np.empty((pushes, card.disks, 2)),

@@ -77,7 +77,7 @@ class ProcessCard(msgspec.Struct, frozen=True, kw_only=True):
     manifest: Manifest
     final_loss: float  # negative log likelihood for each push and output
     seal: str = ""  # hash of all other fields
-    format_version: Literal[2] = 2
+    format_version: Literal[3] = 3
 
     def __post_init__(self) -> None:
         """Refuse identities that no process can have."""
