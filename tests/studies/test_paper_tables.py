@@ -96,13 +96,21 @@ def test_studies_of_the_robot_setup_share_networks(make, tmp_path):
     found = make("regularisation")
     assert [choice["l2"] for choice in found["choices"]] == [1e-4, 1e-6]
     assert all(np.isfinite(choice["score"]) for choice in found["choices"])
+    shorter = make("shorter-training")
+    sain = {"sain", "sain-shorter"}
+    assert rows_of(shorter) == {(None, m, b) for m in PHYSICS | sain for b in (1, 2)}
+    (claim,) = shorter["claims"]
+    assert "errs at most 5% more" in claim["claim"]
     robust = make("robustness")
     groups = {row["group"] for row in robust["rows"]}
     assert len(groups) == 8
     assert groups >= {"as trained", "properties ±10 %", "angles outside", "2 mm apart"}
     # In full, on 3 and on 6 pushes, and with another l2.
     made = Counter(map(without_hash, cards(tmp_path)))
-    assert made == {"in-seed-0": 4, "in-seed-3": 1, "in-single-steps-seed-0": 1}
+    others = {"in-seed-3", "in-single-steps-seed-0", *(f"{s}-seed-0" for s in sain)}
+    assert made == {"in-seed-0": 4} | dict.fromkeys(others, 1)
+    (card,) = (read_card(c.parent) for c in cards(tmp_path) if "shorter" in str(c))
+    assert (card.recipe.decay, card.recipe.iterations) == ("cosine", 1)
     check_test_sets(tmp_path / STEPS)
 
 

@@ -32,15 +32,15 @@ class Reproduce:
     studies: Positional[tuple[str, ...]] = ()
     """Studies: direct-force-two-disks (the paper's Table I), direct-force-three-disks
     (II) and robot-two-disks (III), with Bullet; data-efficiency, recurrent-or-not,
-    regularisation and robustness, with the networks of Table III; published-physics,
-    letter, letter-millimetres, letter-scaled-loss, letter-noise and
-    letter-weak-damper; feedforward, varied-or-fixed and crossed-properties, at reduced
-    size; simulated-control, control-any-number, control-in-the-way and adaptation,
-    with shipped networks; any-number and gaps; expected-cost;
-    robot-planar; engine-parity; pretrained (the shipped networks); fine-tuning
-    (settings chosen on simulated pushes); recorded-pushes, recorded-trust,
-    recorded-chosen, recorded-ensembles, recorded-few, recorded-active and
-    lab-realism, which need --recorded; lab-collect, lab-prediction (Table IV),
+    regularisation, shorter-training and robustness, with the networks of Table III;
+    published-physics, letter, letter-millimetres, letter-scaled-loss, letter-noise
+    and letter-weak-damper; feedforward, varied-or-fixed and crossed-properties, at
+    reduced size; simulated-control, control-any-number, control-in-the-way and
+    adaptation, with shipped networks; any-number, any-number-assumed and gaps;
+    expected-cost; robot-planar; engine-parity; pretrained (the shipped networks);
+    fine-tuning (settings chosen on simulated pushes); recorded-pushes,
+    recorded-trust, recorded-chosen, recorded-ensembles, recorded-few, recorded-active
+    and lab-realism, which need --recorded; lab-collect, lab-prediction (Table IV),
     lab-control, lab-new-surface, lab-swapped-disks, lab-adaptation and lab-active, in
     virtual labs. Default: every study whose requirements are met."""
     scale: Scale = "quick"

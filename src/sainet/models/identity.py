@@ -44,6 +44,7 @@ Variant = Literal[
     "millimetres",
     "scaled-loss",
     "chosen",
+    "shorter",
 ]
 
 NETWORKS = get_args(ModelKind)
@@ -64,6 +65,7 @@ _VARIANTS = {
     "small-l2": "small l2",
     "millimetres": "loss in millimetres",
     "scaled-loss": "scaled loss",
+    "shorter": "shorter training",
     "three-disks": "3 disks",
     "fixed-properties": "fixed properties",
     "nominal": "nominal inputs",

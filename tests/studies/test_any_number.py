@@ -1,0 +1,31 @@
+"""Contact networks for any number of disks: what is trained, and tested on what."""
+
+import pytest
+
+from sainet.studies import load_study
+from sainet.studies.any_number import ASSUMED, CONTACTS
+from sainet.studies.runner import all_steps
+from sainet.studies.steps import Evaluate, Simulate, Train
+from sainet.studies.study import Scope, last_steps
+
+
+@pytest.mark.parametrize(
+    ("name", "network", "disks"),
+    [
+        ("any-number", CONTACTS, {2, 3, 5, 8}),
+        ("any-number-assumed", ASSUMED, {2, 3, 5}),
+    ],
+)
+def test_networks_of_two_disks_are_tested_on_more(name, network, disks):
+    plan = load_study(name).plan(Scope("paper"))
+    steps = list(all_steps(last_steps([plan])).values())
+    trained = [each for each in steps if isinstance(each, Train) and each.id == network]
+    assert sorted(each.recipe.seed for each in trained) == [0, 1, 2, 3, 4]
+    (pushes,) = {each.pushes for each in trained}
+    assert isinstance(pushes, Simulate)
+    assert pushes.config.disks == 2
+    assert network.simulator.slug in pushes.config.assumed_engine
+    tests = [each.pushes.config for each in steps if isinstance(each, Evaluate)]
+    assert {each.disks for each in tests} == disks
+    assert pushes.config.seed not in {each.seed for each in tests}
+    assert len({(each.disks, each.arrangement) for each in tests}) == len(tests)
