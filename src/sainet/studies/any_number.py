@@ -171,7 +171,6 @@ def _compare(
 
 
 _MARGIN, _HALF = 0.05, 0.5  # largest upper bound; columns that are clearly better
-_QUARTER = 0.25  # of the error of the engine with assumed properties
 
 
 def _claims() -> Iterator[Claim]:
@@ -196,23 +195,6 @@ def _claims() -> Iterator[Claim]:
         )
 
 
-def _claims_of_assumed() -> Iterator[Claim]:
-    """Yield claims about contact networks beside the engine that they correct."""
-    for _, named in _conditions(OF_ASSUMED):
-        yield Claim(
-            f"with {named.label}, a contact network around the engine with assumed "
-            "properties errs in position by at most a quarter of what the engine does",
-            errs_at_most_more(
-                ASSUMED.slug,
-                "physics",
-                _QUARTER - 1,
-                condition=named.label,
-                metrics=("pos_mm",),
-            ),
-            margin=_QUARTER - 1,
-        )
-
-
 NUMBERS = Study(
     question="Do networks that were trained on few disks predict pushes of more?",
     plan=_numbers,
@@ -225,7 +207,6 @@ ASSUMED_STUDY = Study(
     "contact network of two disks remove, with two disks and with more?",
     plan=_assumed,
     subject=ASSUMED.slug,
-    claims=tuple(_claims_of_assumed()),
 )
 GAPS = Study(
     question="How do errors depend on the gap between two disks at the start?",
