@@ -29,6 +29,7 @@ def fitted_at(points, length=0.5):
         noise=NOISE * alike,
         mean=0 * alike,
         scale=alike,
+        share=alike,
         centre=np.zeros(points.shape[1]),
         width=np.ones(points.shape[1]),
         errors=np.ones((len(points), 1, 2)),
