@@ -378,7 +378,7 @@ CONNECTIONS = {
     "timing starts and own pushes, processes loaded on demand": 12,
     "pushes in two datasets, a split into another run": 14,
     "kinds of pushes in own tables, origins of datasets": 17,
-    "a shorter training beside the paper's recipe": 26,
+    "a shorter training beside the paper's recipe": 27,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.
     "many machines": 245,
