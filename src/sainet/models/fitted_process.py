@@ -111,7 +111,7 @@ def squared_distances(
 def rates_at(
     fitted: Fitted, inputs: Float[np.ndarray, "push input"]
 ) -> tuple[Float[np.ndarray, "push output"], Float[np.ndarray, "push output"]]:
-    """Return mean and deviation of residuals, as `ResidualProcess.rates` does.
+    """Return the residuals to add and their deviations, as `ResidualProcess.rates`.
 
     In double precision and without compilation, which fits to few pushes would spend
     most of their time on.

@@ -99,7 +99,9 @@ class Process(eqx.Module):
     amplitude: Float[Array, " output"]
     length: Float[Array, "output input"]  # scale of each input
     noise: Float[Array, " output"]  # variance
-    weights: Float[Array, "output push"]  # the inverse covariance times the outputs
+    # The inverse covariance times the outputs. In these and in `mean`, outputs are
+    # multiplied by the share of them that is added.
+    weights: Float[Array, "output push"]
     whitening: Float[Array, "output push push"]  # inverse Cholesky factor of it
     mean: Float[Array, " output"]
     scale: Float[Array, " output"]
@@ -151,7 +153,7 @@ def error_near(errors: T, close: T) -> T:
 
 
 class ResidualProcess(AbstractCorrector):
-    """Adds the residual that a Gaussian process expects to a simulator prediction."""
+    """Adds a share of the expected residual to a simulator prediction."""
 
     process: Process
     centre: Float[Array, " input"]
@@ -236,7 +238,7 @@ class ResidualProcess(AbstractCorrector):
     def rates(
         self, inputs: Float[Array, "push input"]
     ) -> tuple[Float[Array, "push output"], Float[Array, "push output"]]:
-        """Return mean and deviation of residuals per metre of travel (m, m, rad)."""
+        """Return what is added per metre of travel (m, m, rad), and its deviation."""
         return self.process((inputs - self.centre[None]) / self.width[None])
 
     def _rates(
