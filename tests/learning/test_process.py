@@ -247,8 +247,8 @@ def test_little_is_added_where_there_is_nothing_to_learn():
         ends = scattered(25, seed, loud=1.0)
         rates = 0.02 * rng.normal(size=ends.rates.shape)
         pure = replace(ends, rates=rates)
-        shares.append(calibrated_fit(pure, settings, lambda: None).fitted.share)
-        known = calibrated_fit(scattered(200, seed, 1.0), settings, lambda: None)
+        shares.append(calibrated_fit(pure, settings).fitted.share)
+        known = calibrated_fit(scattered(200, seed, 1.0), settings)
         assert (known.fitted.share > 0.9).all()
     assert np.mean(shares) < 0.25
 
@@ -267,7 +267,7 @@ def scattered(pushes: int, seed: int, loud: float) -> Ends:
 def test_regions_are_larger_where_errors_were():
     """A loop over the pushes gives the same sizes."""
     ends, others = scattered(120, 0, loud=5.0), scattered(400, 1, loud=5.0)
-    fitted = calibrated_fit(ends, ProcessSettings(iterations=10), lambda: None).fitted
+    fitted = calibrated_fit(ends, ProcessSettings(iterations=10)).fitted
     process = corrector_of(fitted, ends.names, 1 / 240)
     expected = np.asarray(process.expected(jnp.asarray(others.inputs, jnp.float32)))
     is_loud = others.inputs[:, 0] > 0.2
@@ -298,7 +298,7 @@ def test_regions_are_alike_where_errors_are():
     settings, widest = ProcessSettings(iterations=10), 0
     for seed in range(6):
         ends = scattered(30, seed, loud=1.0)
-        fitted = calibrated_fit(ends, settings, lambda: None).fitted
+        fitted = calibrated_fit(ends, settings).fitted
         assert np.isfinite(fitted.near).all()  # else the file could not be read
         process = corrector_of(fitted, ends.names, 1 / 240)
         expected = process.expected(jnp.asarray(ends.inputs, jnp.float32))

@@ -26,8 +26,8 @@ from sainet.evaluation.measurements import (
 from sainet.evaluation.metrics import REFERENCE_DISTANCE, travel_mm
 from sainet.identification.identify import identify
 from sainet.learning.choosing import choose_pushes
+from sainet.learning.process import calibrated_fit
 from sainet.learning.process_ends import Ends, ends_of
-from sainet.learning.process_fit import fit_to
 from sainet.models.correctors.process import RESIDUALS
 from sainet.models.fitted_process import rates_at
 from sainet.models.identity import ModelId
@@ -100,7 +100,7 @@ def _errors(
     known, found = order[: counts[0]], []
     for more in np.diff((*counts, counts[-1])):
         has = np.isin(np.arange(len(ends.travel)), known)
-        fitted, _ = fit_to(ends.take(has), SETTINGS)
+        fitted = calibrated_fit(ends.take(has), SETTINGS).fitted
         found.append(_missed(ends, tests, rates_at(fitted, ends.inputs[tests])[0]))
         rest = order[~np.isin(order, known)]
         if chosen and more:
