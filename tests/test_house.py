@@ -417,10 +417,11 @@ COUNTS = {
     ),
     "code lines of models that know how sure they are": (
         # Regions that are as large as errors nearby: 44 of them; the share of a
-        # residual that is added: 25.
+        # residual that is added: 25; warnings of few training pushes and of other
+        # numbers of disks, which were in planning/: 31.
         lambda: sum(map(code_lines, modules_of(TRUST))),
-        1_344,
-        1_344,
+        1_375,
+        1_375,
     ),
     "code lines of kernels": (
         lambda: sum(map(code_lines, modules_of(KERNELS))),

@@ -7,13 +7,20 @@ import pytest
 from msgspec import structs
 
 from learning.stores import info_of, made_up
+from models.samples import CARD
 from sainet.datasets.groups import groups_of
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines import RECORDED
 from sainet.evaluation.coverage import Coverage, in_words
 from sainet.evaluation.intervals import Estimate
-from sainet.evaluation.unlike import other_groups, other_worlds, unlike_pushes
+from sainet.evaluation.unlike import (
+    doubts_of_training,
+    other_groups,
+    other_numbers,
+    other_worlds,
+    unlike_pushes,
+)
 from sainet.models.library import load_model
 
 
@@ -58,6 +65,24 @@ def test_models_of_other_groups_are_warned_of(store):
     assert list(other_groups([fitted_to()], ("ice",))) == []  # unknown
     assert list(other_groups(models[1:], ("ice",))) == []
     assert found in list(unlike_pushes(models, store))
+
+
+def test_a_network_for_another_number_of_disks_is_doubted(store):
+    models = [fitted_to("felt", "ice"), load_model("sain")]
+    (doubt,) = other_numbers(models, 2)
+    assert doubt.startswith("sain-stroke: its network was trained on pushes of 1 disk")
+    assert doubt.endswith("train one on such pushes.")
+    assert doubt in list(unlike_pushes(models, store))
+
+
+def test_a_network_with_few_or_other_training_pushes_is_doubted():
+    few = structs.replace(CARD, trained_pushes=100)
+    assert list(doubts_of_training(None, 3)) == []
+    assert list(doubts_of_training(CARD, 2)) == []
+    (doubt,) = doubts_of_training(few, 2)
+    assert "trained on 100 pushes" in doubt
+    (doubt,) = doubts_of_training(CARD, 3)
+    assert "pushes of 2 disk(s) and may predict this scene of 3" in doubt
 
 
 @pytest.mark.parametrize(

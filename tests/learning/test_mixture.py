@@ -8,6 +8,7 @@ import pytest
 
 from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
+from sainet.evaluation.unlike import doubts_of_count
 from sainet.learning import fit as fit_module
 from sainet.learning.fit import fit
 from sainet.learning.job import STATE
@@ -18,7 +19,6 @@ from sainet.models.card import WEIGHTS, read_card
 from sainet.models.checkpoint import load_network
 from sainet.models.correctors.network import Scales
 from sainet.models.library import find_internal_engine, load_model
-from sainet.planning.checks import doubts_of_count
 from sainet.runs.errors import BadInput, BadStore
 
 RECIPE = CONTACT.changed(

@@ -22,6 +22,7 @@ from sainet.datasets.writer import write_store
 from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
+from sainet.evaluation.unlike import other_numbers
 from sainet.learning.process import (
     calibrated_fit,
     fit_process,
@@ -343,6 +344,7 @@ def test_other_numbers_of_disks_are_refused(model, disks):
     scene = sn.Scene.disks(mass=[1.0] * disks, radius=[0.055] * disks)
     with pytest.raises(BadCheckpoint, match=f"takes 2 disk.s., not {disks};"):
         model.predict(scene, scene.in_a_row(), sn.Push(contact_angle=0.1))
+    assert list(other_numbers([model], disks)) == []  # no second line
 
 
 def test_no_network_starts_from_a_process(folder, store):

@@ -9,15 +9,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from msgspec import structs
 
-from models.samples import CARD, quick_dynamics
+from models.samples import quick_dynamics
 from planning.scenes import FEW, RADIUS, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning import tree as tree_module
-from sainet.planning.checks import doubts_of_training
 from sainet.planning.greedy import GreedyPlanner
 from sainet.planning.levels import Level, Problem, judge, predicted_ends, roll_pushes
 from sainet.planning.tree import TreePlanner
@@ -321,13 +319,3 @@ def test_planners_by_name():
         make_planner("cem")
     with pytest.raises(BadInput, match="`deadline`"):
         make_planner("greedy", deadline=1.0)
-
-
-def test_a_network_with_few_or_other_training_pushes_is_doubted():
-    few = structs.replace(CARD, trained_pushes=100)
-    assert list(doubts_of_training(None, 3)) == []
-    assert list(doubts_of_training(CARD, 2)) == []
-    (doubt,) = doubts_of_training(few, 2)
-    assert "trained on 100 pushes" in doubt
-    (doubt,) = doubts_of_training(CARD, 3)
-    assert "pushes of 2 disk(s) and may predict this scene of 3" in doubt

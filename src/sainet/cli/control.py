@@ -49,7 +49,7 @@ class Control:
         use_cache()
         from sainet.control.trials import measure_trials, prepare
         from sainet.evaluation.trials import trial_rows
-        from sainet.planning.checks import doubts_of_training
+        from sainet.evaluation.unlike import doubts_of_training
         from sainet.report.figures.episodes import draw_episodes
 
         config = self.config

@@ -72,7 +72,6 @@ class Evaluate:
         from sainet.evaluation.coverage import coverage_of, in_words, to_json
         from sainet.evaluation.summary import summarise
         from sainet.evaluation.unlike import unlike_pushes
-        from sainet.planning.checks import doubts_of_count
         from sainet.report.arrange import arrange
         from sainet.report.writers import print_table, write_table
 
@@ -81,9 +80,6 @@ class Evaluate:
         rows = with_abstaining(models) if self.abstain else models
         for warning in unlike_pushes(models, store):
             self.output.warn(warning)
-        for model in models:
-            for doubt in doubts_of_count(model.card, store.info.bodies):
-                self.output.warn(f"{model.name}: {doubt}.")
         if (shard := self.machines.share) is not None:
             nobody = self.machines.scheduler
             require(nobody is None, "scheduler", "left out with a shard", nobody)

@@ -5,9 +5,7 @@ from collections.abc import Iterator, Sequence
 import equinox as eqx
 import numpy as np
 
-from sainet.models.card import Card
 from sainet.models.dynamics import AbstractDynamics
-from sainet.models.process_card import ProcessCard
 from sainet.models.push_inputs import untrained
 from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import Push
@@ -16,9 +14,6 @@ from sainet.scenes.state import State, check_state
 
 _DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise
 _APART = 5e-3  # m, gap that counts as apart: networks are trained on touching disks
-# With fewer training pushes the errors of networks rise steeply: they double from 150
-# to 50 simulated pushes (`sainet reproduce data-efficiency`).
-_FEW_PUSHES = 150
 _compiled_gaps = eqx.filter_jit(pair_gaps)
 
 
@@ -57,38 +52,3 @@ def doubts(
         )
     for number, push in enumerate(pushes, start=1):
         yield from (f"push {number}: {doubt}" for doubt in untrained(push))
-
-
-def doubts_of_training(card: Card | ProcessCard | None, disks: int) -> Iterator[str]:
-    """Yield reasons why plans with a network may fail, from its training data.
-
-    Args:
-        card: of the trained model; None without one.
-        disks: in the scene to plan in.
-    """
-    if card is None:
-        return
-    if card.trained_pushes < _FEW_PUSHES:
-        yield (
-            f"its {card.noun} was trained on {card.trained_pushes} pushes; give it at "
-            f"least {_FEW_PUSHES}"
-        )
-    yield from doubts_of_count(card, disks)
-
-
-def doubts_of_count(card: Card | ProcessCard | None, disks: int) -> Iterator[str]:
-    """Yield a reason why predictions may fail: fewer disks than in training, or more.
-
-    Args:
-        card: of the trained model; None without one.
-        disks: in the scene.
-    """
-    if card is None:
-        return
-    trained = card.numbers_of_disks
-    if not trained[0] <= disks <= trained[-1]:
-        known = " to ".join(map(str, sorted({trained[0], trained[-1]})))
-        yield (
-            f"its {card.noun} was trained on pushes of {known} disk(s) and may predict "
-            f"this scene of {disks} badly; train one on such pushes"
-        )
