@@ -89,7 +89,7 @@ class Evaluate:
         print_table(arrange(summary), self.output.console)
         covered = coverage_of(measured)
         for sentence in in_words(covered):
-            self.output.say(sentence)
+            self.output.console.print(sentence, soft_wrap=True)
         if self.table is not None:
             write_table(arrange(summary), self.table)
         self._write_page(models, store, measured)

@@ -13,7 +13,8 @@ class MakeReport:
     """Write report.html, a self-contained page, into a run folder."""
 
     folder: Positional[Path]
-    """Run folder of train, control, identify, demo or one study of reproduce."""
+    """Run folder of train, tune, identify, control, play, demo or one study of
+    reproduce."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:

@@ -86,8 +86,9 @@ class Tune:
     the folder of a trained network."""
     engine: str | None = None
     """Internal engine: the folder of identified parameters ('sainet identify'), or a
-    simulator whose prediction the dataset contains (default: planar for SAIN; gp
-    identifies the engine on the same pushes)."""
+    simulator whose prediction the dataset contains (default: planar, with the masses
+    and radii of the paper's disks, for SAIN; gp identifies the engine on the same
+    pushes)."""
     group: str | None = None
     """Group of pushes to train on, or surface (default: all groups)."""
     pushes: int | None = None

@@ -71,8 +71,8 @@ class ControlConfig(RobotConfig):
     """Measured distance that ends an episode (fraction of the
     tolerance). The default leaves four standard deviations of measurement noise."""
     alignment: float = 3.0
-    """Weight of the cosine distance in the heuristic (m). A row whose target disk is
-    not disk 2 is steered instead."""
+    """Weight of the cosine distance in the heuristic (m), only if the target disk is
+    disk 2: a longer row is steered instead."""
     expected_cost: bool = False
     """Judge pushes by the mean cost over the predicted distribution of final positions,
     with a model that has regions (a Gaussian process or an ensemble)."""

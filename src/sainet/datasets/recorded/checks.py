@@ -69,7 +69,7 @@ def clock_problems(recording: Recording) -> Iterator[Problem]:
         yield Problem(
             "lasts over 60 s",
             f"lasts {duration:g} s (in milliseconds?); at most {LONGEST:g} s are "
-            "allowed: give times in seconds",
+            "allowed: give times in seconds, or `time_unit`",
             sample=len(recording.time) - 1,
         )
     elif round(duration / TIME_STEP) < 1:
@@ -114,8 +114,9 @@ def _degrees(
         if turn * properties.radius[body] > _MOST * way + _SLACK:
             yield Problem(
                 "an angle changes too much",
-                f"the angle changes by {turn:.3g} while all moves by {way:.3g} m (in "
-                "degrees?); give angles in radians",
+                f"the angle changes by {turn:.3g} rad while disk and pusher together "
+                f"move by {way:.3g} m (in degrees?); give angles in radians, or "
+                "`angle_unit`",
                 body=body,
             )
 
