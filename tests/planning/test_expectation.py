@@ -73,8 +73,17 @@ class Unsure(PhysicsDynamics):
         return Region(heading, axes, zeros, axes)
 
 
-def test_planners_avoid_pushes_that_a_model_is_unsure_about():
-    unsure = Unsure(load_model("physics-true").dynamics.engine)
+class UnsureOnHost(Unsure):
+    """The same, as if its engine ran outside JAX."""
+
+    @property
+    def on_host(self):
+        return True
+
+
+@pytest.mark.parametrize("kind", [Unsure, UnsureOnHost])
+def test_planners_avoid_pushes_that_a_model_is_unsure_about(kind):
+    unsure = kind(load_model("physics-true").dynamics.engine)
     task = goal_ahead(0.05)
     headings = {}
     for expected in (False, True):

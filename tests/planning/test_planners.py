@@ -14,10 +14,18 @@ from models.samples import quick_dynamics
 from planning.scenes import FEW, RADIUS, goal_ahead, scene, single, touching
 from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
+from sainet.models.library import load_model
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning import tree as tree_module
 from sainet.planning.greedy import GreedyPlanner
-from sainet.planning.levels import Level, Problem, judge, predicted_ends, roll_pushes
+from sainet.planning.levels import (
+    Level,
+    Problem,
+    judge,
+    predicted_ends,
+    roll_pushes,
+    settled_steps,
+)
 from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
 from sainet.scenes.pushes import PushGrid
@@ -34,7 +42,7 @@ every_planner = pytest.mark.parametrize("name", PLANNERS)
 @eqx.filter_jit
 def end_of(push, state):
     batch = jax.tree.map(lambda x: x[None], (SCENE, state, push))
-    end = roll_pushes(PHYSICS, *batch).final
+    end = roll_pushes(PHYSICS, *batch, 80).final
     return jax.tree.map(
         lambda x: x[0], at_rest(end.position, end.angle, end.pusher_position)
     )
@@ -207,6 +215,28 @@ def test_outcomes_are_those_of_single_predictions():
     np.testing.assert_allclose(found.state.position[1], wanted.position, atol=1e-6)
     assert found.distance[1] == pytest.approx(float(FAR.distance(wanted)), abs=1e-6)
     assert not found.state.velocity.any()
+
+
+@pytest.mark.parametrize(
+    ("length", "speed", "time_step"),
+    [(0.01, 0.05, 1 / 240), (0.01, 0.02, 1 / 240), (0.03, 0.05, 1 / 240)]
+    + [(0.01, 0.05, 1 / 1000)],
+)
+def test_pushes_are_predicted_until_everything_rests(length, speed, time_step):
+    slow = replace(SCENE, time_step=time_step)
+    grid = replace(FEW, length=length, speed=speed)
+    push = jax.tree.map(lambda x: x[:1], jax.device_get(grid.pushes()))
+    given = jax.tree.map(lambda x: np.asarray(x)[None], STATE)
+    found = predicted_ends(PHYSICS, slow, given, push)
+    one = jax.tree.map(lambda x: x[0], push)
+    path = load_model("physics-true").predict(slow, STATE, one).final
+    np.testing.assert_allclose(found.position[0], path.position, atol=2e-6)
+    plan = GreedyPlanner(actions=grid).plan(PHYSICS, FAR, slow, STATE)
+    assert len(plan.path) % settled_steps(push, slow) == 0
+
+
+def test_the_papers_pushes_take_48_steps_and_32_to_rest():
+    assert settled_steps(PushGrid().pushes(), SCENE) == 80
 
 
 def moved():

@@ -31,7 +31,7 @@ def test_without_noise_the_robot_equals_the_engine():
     seen = made.observe()
     found = made.push(PUSH)
     batch = jax.tree.map(lambda x: x[None], (scene(), seen, PUSH))
-    wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch).states
+    wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch, 80).states
     position = np.asarray(wanted.position[0])
     np.testing.assert_allclose(found.pose[1:81, :, :2], position, atol=1e-5)
     np.testing.assert_allclose(made.truth.position, found.pose[-1, :, :2])

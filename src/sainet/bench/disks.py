@@ -11,7 +11,7 @@ from sainet.control.config import ControlConfig
 from sainet.control.trial import make_trial
 from sainet.models.library import load_model
 from sainet.planning import make_planner
-from sainet.planning.levels import SETTLED_STEPS, judge
+from sainet.planning.levels import judge, settled_steps
 from sainet.scenes.pushes import PushGrid
 
 COUNTS = (2, 4, 8, 16)
@@ -42,13 +42,13 @@ def _figures(count: int, runs: int) -> Figures:
     trial = make_trial(ControlConfig(disks=count), 0)
     one = trial.robot.observe()
     pushes = jax.tree.map(lambda x: np.tile(x, _STATES), PushGrid().pushes())
-    rows = len(pushes.length)
+    rows, steps = len(pushes.length), settled_steps(pushes, trial.scene)
     states = jax.tree.map(lambda x: np.repeat(np.asarray(x)[None], rows, 0), one)
     found: dict[str, float] = {}
     for name, model in _MODELS.items():
         judged = load_model(model).dynamics, trial.task, trial.scene
         time = median_seconds(lambda j=judged: judge(*j, states, pushes), runs)
-        found[f"{name}_step_us_{count}"] = 1e6 * time / (rows * SETTLED_STEPS)
+        found[f"{name}_step_us_{count}"] = 1e6 * time / (rows * steps)
     planner, dynamics = make_planner("tree"), load_model(_MODELS["network"]).dynamics
     found[f"tree_s_{count}"] = median_seconds(
         lambda: planner.plan(dynamics, trial.task, trial.scene, one).cost, runs

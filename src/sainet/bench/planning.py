@@ -20,7 +20,7 @@ from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.library import load_model
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.base import Plan
-from sainet.planning.levels import batch_of, roll_pushes
+from sainet.planning.levels import batch_of, roll_pushes, settled_steps
 from sainet.scenes.pushes import PushGrid
 
 DECISIONS = 50
@@ -105,7 +105,8 @@ def _bullet_pushes() -> list[float]:
     for index in range(_PUSHES):
         push = jax.tree.map(lambda x, i=index: x[i][None], PushGrid().pushes())
         start = perf_counter()
-        jax.block_until_ready(roll_pushes(physics, scene, state, push).states)
+        steps = settled_steps(push, scene)
+        jax.block_until_ready(roll_pushes(physics, scene, state, push, steps).states)
         times.append(perf_counter() - start)
     return times
 

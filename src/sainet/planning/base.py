@@ -14,7 +14,14 @@ from jaxtyping import Array, Float
 from sainet.models.dynamics import AbstractDynamics, check_purpose
 from sainet.models.library import Loadable, as_model
 from sainet.planning.checks import check_observation, doubts
-from sainet.planning.levels import Found, Problem, batch_of, predicted_ends, roll_pushes
+from sainet.planning.levels import (
+    Found,
+    Problem,
+    batch_of,
+    predicted_ends,
+    roll_pushes,
+    settled_steps,
+)
 from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.scene import Scene
@@ -108,7 +115,8 @@ def predicted_path(
     state = jax.tree.map(_batch_of_one, state)
     poses = []
     for push in pushes:
-        pose, state = roll(dynamics, scene, state, jax.tree.map(_batch_of_one, push))
+        steps, one = settled_steps(push, scene), jax.tree.map(_batch_of_one, push)
+        pose, state = roll(dynamics, scene, state, one, steps)
         poses.append(np.asarray(pose)[0])
     return np.concatenate(poses)
 
@@ -118,9 +126,9 @@ def _batch_of_one(x: Array | np.ndarray | np.generic) -> Array:
 
 
 def _path_and_rest(
-    dynamics: AbstractDynamics, scene: Scene, state: State, push: Push
+    dynamics: AbstractDynamics, scene: Scene, state: State, push: Push, steps: int
 ) -> tuple[Float[Array, "1 time body 3"], State]:
-    trajectory = roll_pushes(dynamics, batch_of(scene, 1), state, push)
+    trajectory = roll_pushes(dynamics, batch_of(scene, 1), state, push, steps)
     states, end = trajectory.states, trajectory.final
     pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
     return pose, at_rest(end.position, end.angle, end.pusher_position)

@@ -1,5 +1,6 @@
 """Outcomes of sequences of pushes, and the levels that a search selects from."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,8 +20,7 @@ from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, Trajectory, at_rest
 from sainet.tasks.push_to_goal import AbstractTask
 
-SETTLED_STEPS = 80  # 48 of motion and 32 until everything rests
-
+_RESTED = 32 / 240  # s, until everything rests after a push
 _NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
 AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
 _Result = TypeVar("_Result")
@@ -60,15 +60,26 @@ def judge(
     Returns:
         The outcomes, ``[push]``, as NumPy arrays.
     """
-    function = _judge_expected if expected and not dynamics.on_host else _judge
-    return _of_pushes(function, (dynamics, task, scene), states, pushes, AT_ONCE)
+    shared = dynamics, task, scene, settled_steps(pushes, scene)
+    function = _judge_expected if expected else _judge
+    return _of_pushes(function, shared, states, pushes, AT_ONCE)
 
 
 def predicted_ends(
     dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
 ) -> State:
     """Return where one push from each state of one scene ends, ``[push]``, at rest."""
-    return _of_pushes(_ends, (dynamics, scene), states, pushes)
+    shared = dynamics, scene, settled_steps(pushes, scene)
+    return _of_pushes(_ends, shared, states, pushes)
+
+
+def settled_steps(pushes: Push, scene: Scene) -> int:
+    """Return the steps until every push has ended and everything rests."""
+    moving = float(np.max(np.asarray(pushes.length) / np.asarray(pushes.speed)))
+    rounding = 1e-3
+    return math.ceil(moving / scene.time_step - rounding) + round(
+        _RESTED / scene.time_step
+    )
 
 
 def _of_pushes(
@@ -86,17 +97,19 @@ def _of_pushes(
     return jax.device_get(found)
 
 
-def _ends(shared: tuple[AbstractDynamics, Scene], states: State, pushes: Push) -> State:
-    dynamics, scene = shared
+def _ends(
+    shared: tuple[AbstractDynamics, Scene, int], states: State, pushes: Push
+) -> State:
+    dynamics, scene, steps = shared
     scenes = batch_of(scene, states.angle.shape[0])
-    return ends_of(dynamics, scenes, states, pushes)
+    return ends_of(dynamics, scenes, states, pushes, steps)
 
 
 def roll_pushes(
-    dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
+    dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push, steps: int
 ) -> Trajectory:
     """Return the motion of one push from each state; all share one batch axis."""
-    initial, controls = command_path(scene, states, pushes, steps=SETTLED_STEPS)
+    initial, controls = command_path(scene, states, pushes, steps=steps)
     carry = dynamics.begin(scene, initial)
     return dynamics.advance(scene, carry, controls)[1]
 
@@ -107,19 +120,21 @@ def batch_of(scene: Scene, count: int) -> Scene:
 
 
 def _judge(
-    shared: tuple[AbstractDynamics, AbstractTask, Scene], states: State, pushes: Push
+    shared: tuple[AbstractDynamics, AbstractTask, Scene, int],
+    states: State,
+    pushes: Push,
 ) -> Outcomes:
-    dynamics, task, scene = shared
+    dynamics, task, scene, steps = shared
     scenes = batch_of(scene, states.angle.shape[0])
-    ends = ends_of(dynamics, scenes, states, pushes)
+    ends = ends_of(dynamics, scenes, states, pushes, steps)
     return outcomes_of(task, scenes, states, pushes, ends)
 
 
 def ends_of(
-    dynamics: AbstractDynamics, scenes: Scene, states: State, pushes: Push
+    dynamics: AbstractDynamics, scenes: Scene, states: State, pushes: Push, steps: int
 ) -> State:
     """Return where one push from each state ends, at rest; all share one batch axis."""
-    end = roll_pushes(dynamics, scenes, states, pushes).final
+    end = roll_pushes(dynamics, scenes, states, pushes, steps).final
     return at_rest(end.position, end.angle, end.pusher_position)
 
 
@@ -135,13 +150,15 @@ def outcomes_of(
 
 
 def _judge_expected(
-    shared: tuple[AbstractDynamics, AbstractTask, Scene], states: State, pushes: Push
+    shared: tuple[AbstractDynamics, AbstractTask, Scene, int],
+    states: State,
+    pushes: Push,
 ) -> Outcomes:
     """Return the outcomes with the cost and the distance that are expected."""
-    dynamics, task, scene = shared
+    dynamics, task, scene, steps = shared
     found = _judge(shared, states, pushes)
     scenes = batch_of(scene, states.angle.shape[0])
-    commanded = command_path(scenes, states, pushes, steps=SETTLED_STEPS)
+    commanded = command_path(scenes, states, pushes, steps=steps)
     region = dynamics.region(scenes, *commanded)
     if region is None:
         return found
@@ -177,6 +194,11 @@ class Problem:
     def pushes(self) -> Push:
         """The candidate pushes, on the host."""
         return jax.device_get(self.grid.pushes())
+
+    @cached_property
+    def steps(self) -> int:
+        """How many steps each push is predicted for."""
+        return settled_steps(self.pushes, self.scene)
 
     @property
     def is_near(self) -> bool:

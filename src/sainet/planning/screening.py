@@ -74,7 +74,7 @@ class Screen:
         """Return the cost of pushes by the engine and the residuals of first pushes."""
         problem = self.problem
         added = jax.tree.map(lambda x: x[actions], self._residual)
-        shared = engine, problem.task, problem.scene
+        shared = engine, problem.task, problem.scene, problem.steps
         rows = states, problem.at(actions), added
         return np.asarray(over_devices(_corrected_cost, shared, *rows, most=AT_ONCE))
 
@@ -85,30 +85,34 @@ class Screen:
         start = jax.tree.map(
             lambda x: np.repeat(np.asarray(x)[None], len(pushes), axis=0), problem.state
         )
-        shared = problem.dynamics.engine_alone, problem.scene
+        shared = problem.dynamics.engine_alone, problem.scene, problem.steps
         rows = start, problem.at(pushes), self.first.outcomes.state
         return jax.device_get(over_devices(_residual_of, shared, *rows))
 
 
 def _residual_of(
-    shared: tuple[AbstractDynamics, Scene], states: State, pushes: Push, found: State
+    shared: tuple[AbstractDynamics, Scene, int],
+    states: State,
+    pushes: Push,
+    found: State,
 ) -> Residual:
-    engine, scene = shared
-    ends = ends_of(engine, batch_of(scene, states.angle.shape[0]), states, pushes)
+    engine, scene, steps = shared
+    scenes = batch_of(scene, states.angle.shape[0])
+    ends = ends_of(engine, scenes, states, pushes, steps)
     back = -push_axis(states)[:, None]
     moved = rotate(found.position - ends.position, back), found.angle - ends.angle
     return Residual(*map(jnp.nan_to_num, moved))  # unknown where a model diverged
 
 
 def _corrected_cost(
-    shared: tuple[AbstractDynamics, AbstractTask, Scene],
+    shared: tuple[AbstractDynamics, AbstractTask, Scene, int],
     states: State,
     pushes: Push,
     added: Residual,
 ) -> Float[Array, " push"]:
-    engine, task, scene = shared
+    engine, task, scene, steps = shared
     scenes = batch_of(scene, states.angle.shape[0])
-    ends = ends_of(engine, scenes, states, pushes)
+    ends = ends_of(engine, scenes, states, pushes, steps)
     moved = rotate(added.position, push_axis(states)[:, None])
     ends = at_rest(
         ends.position + moved, ends.angle + added.angle, ends.pusher_position

@@ -171,7 +171,7 @@ def test_a_push_moves_the_disks_as_the_engine_predicts():
         np.testing.assert_allclose(pose[-1, :, 2], along.angle, atol=0.01)
         # A commanded pusher stops at once, and the disks slide on: 0.8 mm.
         batch = jax.tree.map(lambda x: jnp.asarray(x)[None], (CELL.scene, seen, PUSH))
-        wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch).final
+        wanted = roll_pushes(PhysicsDynamics(make_engine("planar")), *batch, 80).final
         np.testing.assert_allclose(pose[-1, :, :2], wanted.position[0], atol=1e-3)
         np.testing.assert_allclose(pose[-1, :, 2], wanted.angle[0], atol=0.02)
         way = np.linalg.norm(pusher[-1] - pusher[0])
