@@ -7,6 +7,7 @@ import pytest
 from learning.stores import end_points_alone, info_of, made_up, write
 from models.samples import identified_folder
 from sainet.datasets.batch import to_batch, to_initial
+from sainet.learning import fit as fit_module
 from sainet.learning.batches import predict_batch
 from sainet.learning.fit import fit
 from sainet.learning.job import Best
@@ -196,6 +197,36 @@ def test_an_interrupted_tuning_gives_the_same_network(store, start, tmp_path):
     with pytest.raises(Stopped):
         fit("sain", store, patient, tmp_path / "cut", on_step=stop)
     fit("sain", store, patient, tmp_path / "cut")
+    for name in ("network.safetensors", "log.jsonl"):
+        whole, cut = ((tmp_path / run / name).read_bytes() for run in ("whole", "cut"))
+        assert whole == cut
+
+
+@pytest.mark.parametrize(("patience", "last"), [(1, 3), (4, 6)])
+def test_only_validation_ends_a_training_run(
+    store, tmp_path, monkeypatch, patience, last
+):
+    losses = iter([0.9, 0.95, 0.95, 0.95, 0.95])  # of the start, then every third
+    monkeypatch.setattr(Mixture, "validate", lambda *_: lambda _: next(losses))
+    recipe = TUNING.changed(patience=patience, log_every=3)
+    result = fit("in", store, recipe, tmp_path / "out")
+    assert [line.iteration for line in result.history][-1] == last
+
+
+def test_a_training_run_that_died_after_its_early_end_only_ends(
+    store, tmp_path, monkeypatch
+):
+    recipe = TUNING.changed(patience=2, learning_rate=1e-9)
+    fit("in", store, recipe, tmp_path / "whole")
+
+    def die(job):
+        raise Stopped
+
+    with monkeypatch.context() as patched:
+        patched.setattr(fit_module, "finish", die)
+        with pytest.raises(Stopped):
+            fit("in", store, recipe, tmp_path / "cut")
+    fit("in", store, recipe, tmp_path / "cut")
     for name in ("network.safetensors", "log.jsonl"):
         whole, cut = ((tmp_path / run / name).read_bytes() for run in ("whole", "cut"))
         assert whole == cut

@@ -263,6 +263,12 @@ def test_a_log_drops_lines_after_the_checkpoint(tmp_path):
     assert read_log(tmp_path) == lines[:2]
 
 
+@pytest.mark.parametrize("checked", [np.nan, np.inf])
+def test_every_line_that_training_writes_can_be_read(tmp_path, checked):
+    append_log(tmp_path, LogLine(5, 2e9, checked))
+    assert read_log(tmp_path) == (LogLine(5, 2e9),)
+
+
 @pytest.mark.parametrize(
     "line",
     [b"{", b"[]", b'{"loss": 1}', b'{"iteration": 1, "loss": "x"}', b"\xff", b""],

@@ -104,9 +104,9 @@ class Job:
     @property
     def left(self) -> range:
         """The iterations that are left."""
-        return range(
-            int(self.progress.state.iteration) + 1, self.mixture.lead.iterations + 1
-        )
+        done = int(self.progress.state.iteration)
+        last = done if self._is_stale(done) else self.mixture.lead.iterations
+        return range(done + 1, last + 1)
 
     def note(self, iteration: int, loss: Array) -> bool:
         """Log and save where it is time to; return whether training ends early.
@@ -120,8 +120,14 @@ class Job:
             _log_line(progress, iteration, float(loss), self.validate, out)
         if iteration % recipe.checkpoint_every == 0 or last:
             save_arrays(out / STATE, (progress.state, progress.best))
-        best, patience = progress.best, recipe.stopping.patience
-        return best is not None and best.is_stale(iteration, patience)
+        return self._is_stale(iteration)
+
+    def _is_stale(self, iteration: int) -> bool:
+        """Return whether validation after this iteration ends the training run."""
+        best, recipe = self.progress.best, self.recipe
+        if best is None or iteration % recipe.log_every:
+            return False
+        return best.is_stale(iteration, recipe.stopping.patience)
 
 
 def begin(

@@ -1,6 +1,5 @@
 """The log of a training run: JSON lines, equal after an interruption."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,7 +8,6 @@ import msgspec
 from sainet.runs.documents import read_file, write_bytes
 from sainet.runs.errors import BadCheckpoint
 from sainet.runs.progress import Advance
-from sainet.scenes.quantities import Finite
 
 LOG = "log.jsonl"
 _LARGEST = 1 << 30  # bytes
@@ -19,7 +17,7 @@ class LogLine(msgspec.Struct, frozen=True, omit_defaults=True):
     """Losses after an iteration, means over pushes and without l2."""
 
     iteration: int
-    loss: Finite  # of the batch
+    loss: float  # of the batch
     validation_loss: float | None = None  # None without validation pushes
 
 
@@ -66,7 +64,8 @@ def append_log(folder: Path, line: LogLine) -> None:
 
 
 def _text(line: LogLine) -> str:
-    return json.dumps(msgspec.to_builtins(line)) + "\n"
+    """Return a line of JSON; a validation loss that is not finite becomes null."""
+    return msgspec.json.encode(line).decode() + "\n"
 
 
 def reported(advance: Advance) -> Callable[[int, float | None], None]:
