@@ -226,3 +226,10 @@ def lost_record():
     lost["turns"][-1]["pusher"][1:] = [[None] * 2] * 2
     lost["final"] = [[None] * 3] * 2
     return msgspec.convert(lost, EpisodeRecord)
+
+
+def refused_record():
+    """Return the record of an episode whose second push the robot refused."""
+    refused = record_json()
+    refused["turns"][1] |= {"actual": [], "pusher": [], "planned": []}
+    return msgspec.convert(refused, EpisodeRecord)

@@ -6,9 +6,10 @@ from xml.etree import ElementTree
 import numpy as np
 from msgspec import structs
 
-from report.samples import lost_record, record
+from report.samples import lost_record, record, refused_record
 from sainet.report.episode_frames import EpisodeFrames, episode_data, outcome
 from sainet.report.figures.episodes import body_paths, draw_episodes
+from sainet.report.pages.page import Report, to_page
 from sainet.report.palette import MOVED, PUSHED
 
 
@@ -84,3 +85,15 @@ def test_a_long_reason_leaves_room_for_the_picture(tmp_path):
 def test_details_of_a_reason_stay_in_the_record():
     lost = record(solved=False, reason="out of pushes: the goal was 177 mm away")
     assert outcome(lost) == "out of pushes after 3 pushes"
+
+
+def test_a_refused_push_has_one_frame_in_figures_and_pages(tmp_path):
+    refused = refused_record()
+    assert body_paths(refused).shape == (1 + 2 * 3, 2, 3)
+    assert draw_episodes([refused], tmp_path / "a.svg").is_file()
+    frames = EpisodeFrames(refused)
+    assert (frames.starts, len(frames.poses), len(frames.pusher)) == ([0, 4, 5], 9, 9)
+    assert np.isnan(frames.pusher[4]).all()
+    data = episode_data(refused)
+    assert data["turns"][1]["plan"] == 2 * [{"x": [], "y": []}]
+    assert "refused" in to_page(Report(title="refused", episodes=[refused]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from report.samples import lost_record, record
+from report.samples import lost_record, record, refused_record
 from sainet.report.episode_frames import EpisodeFrames
 from sainet.report.figures import video
 from sainet.report.figures.video import (
@@ -33,9 +33,9 @@ def test_an_animation_shows_every_frame_and_then_holds(pictures):
     assert not any(changes[shown - 1 :])
 
 
-def test_an_animation_continues_after_nan():
-    lost = lost_record()
-    assert len(list(draw_frames(lost))) == frame_count(lost)
+@pytest.mark.parametrize("odd", [lost_record(), refused_record()])
+def test_an_animation_continues_after_nan_and_a_refused_push(odd):
+    assert len(list(draw_frames(odd))) == frame_count(odd)
 
 
 @pytest.mark.parametrize("pushes", [0, 1])

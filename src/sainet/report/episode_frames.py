@@ -107,26 +107,23 @@ class EpisodeFrames:
         """The pose of each disk (mm, mm, degrees)."""
         if not self._steps:
             return np.asarray([self.record.final], float)
-        parts = [
-            part
-            for step in self._steps
-            for part in ([step.observed], self._shown(step.actual))
-        ]
+        parts = [[step.observed, *self._shown(step.actual)] for step in self._steps]
         return np.concatenate([np.asarray(part, float) for part in parts])
 
     @cached_property
     def pusher(self) -> Float[np.ndarray, "frame 2"]:
-        """The centre of the pusher (mm); NaN before the first push."""
-        if not self._steps:
-            return np.full((1, 2), np.nan)
-        parts = [self._shown(step.pusher) for step in self._steps]
+        """The centre of the pusher (mm); NaN where there is no push."""
+        unknown = [[np.nan, np.nan]]
+        parts = [self._shown(step.pusher) for step in self._steps] or [[]]
         # While the disks are observed, the pusher is at the start of its push.
-        return np.concatenate([np.asarray([part[0], *part], float) for part in parts])
+        parts = [[*(part[:1] or unknown), *part] for part in parts]
+        return np.concatenate([np.asarray(part, float) for part in parts])
 
     @property
     def plans(self) -> list[Float[np.ndarray, "point body 2"]]:
         """The planned path of the disks' centres at each decision (mm)."""
-        paths = [np.asarray(step.planned, float) for step in self._steps]
+        shape = (-1, len(self.record.radius_mm), 3)
+        paths = [np.asarray(s.planned, float).reshape(shape) for s in self._steps]
         return [
             np.concatenate([path[::_STRIDE, :, :2], path[-1:, :, :2]]) for path in paths
         ]

@@ -97,8 +97,8 @@ def body_paths(record: EpisodeRecord) -> np.ndarray:
     steps = record.steps
     if not steps:
         return np.asarray([record.final], float)
-    parts = [[steps[0].observed], *(step.actual for step in steps)]
-    return np.concatenate([np.asarray(part, float) for part in parts])
+    poses = [steps[0].observed, *(pose for step in steps for pose in step.actual)]
+    return np.asarray(poses, float)
 
 
 def body_color(record: EpisodeRecord, body: int) -> str:
