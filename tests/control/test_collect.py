@@ -12,11 +12,12 @@ from importlib.util import find_spec
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 
 from sainet.cli.entry import run
 from sainet.control import collect as module
 from sainet.control.collect import DATASET, SUMMARY, collect, push_file, summary_of
-from sainet.control.collected import read_push
+from sainet.control.collected import read_push, write_push
 from sainet.control.config import CollectConfig
 from sainet.datasets.store import open_store
 from sainet.robots import make_robot
@@ -205,6 +206,16 @@ def test_an_edited_push_is_refused(done, tmp_path):
     text = push_file(out, 7).read_text()
     push_file(out, 7).write_text(text.replace('"trouble":""', '"trouble":"none"'))
     with pytest.raises(BadInput, match="000007.json: seal: .*edited. Delete it"):
+        collect(CONFIG, out)
+
+
+def test_pushes_of_other_disks_do_not_become_one_dataset(done, tmp_path):
+    out = tmp_path / "out"
+    shutil.copytree(done[0], out)
+    (out / SUMMARY).unlink()
+    other = structs.replace(read_push(push_file(out, 7)), radius=[0.058, 0.059])
+    write_push(push_file(out, 7), other)
+    with pytest.raises(BadInput, match="000007.json: its disks are not .*delete it"):
         collect(CONFIG, out)
 
 

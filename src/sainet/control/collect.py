@@ -22,6 +22,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.control.collected import (
+    REMEDY,
     PushDocument,
     import_recordings,
     read_push,
@@ -37,7 +38,7 @@ from sainet.planning import make_planner
 from sainet.robots import make_robot
 from sainet.robots.base import AbstractRobot
 from sainet.runs.documents import read_document, write_document
-from sainet.runs.errors import SainetError
+from sainet.runs.errors import BadInput, SainetError
 from sainet.runs.folders import open_run, remake
 from sainet.scenes.pushes import Push, PushGrid, push_axis
 from sainet.scenes.scene import TIME_STEP
@@ -148,13 +149,14 @@ def _record(
 
 def _import(config: CollectConfig, out: Path, settings: Mapping[str, object]) -> None:
     """Make the dataset, then the summary, which completes the session."""
-    found = [read_push(push_file(out, index)) for index in range(config.pushes)]
-    collected = import_recordings(
-        out / DATASET,
-        settings,
-        [each.recording() for each in found],
-        found[0].properties(),
-    )
+    files = [push_file(out, index) for index in range(config.pushes)]
+    found = [read_push(file) for file in files]
+    properties = found[0].properties()
+    for file, each in zip(files, found, strict=True):
+        if each.properties() != properties:
+            raise BadInput(f"{file}: its disks are not those of push 0; {REMEDY}.")
+    recordings = [each.recording() for each in found]
+    collected = import_recordings(out / DATASET, settings, recordings, properties)
     summary = Collected(
         pushes=len(found),
         usable=collected.store.info.pushes,

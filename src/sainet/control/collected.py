@@ -27,7 +27,7 @@ _Known = Finite | None  # None: unknown
 _Pose = Annotated[list[_Known], msgspec.Meta(min_length=3, max_length=3)]
 _Point = Annotated[list[_Known], msgspec.Meta(min_length=2, max_length=2)]
 _DIGITS = 9  # after the point: nanometres and nanoseconds
-_REMEDY = "delete it and run the same command: later pushes are made again"
+REMEDY = "delete it and run the same command: later pushes are made again"
 
 
 class Command(msgspec.Struct, frozen=True, kw_only=True):
@@ -166,9 +166,9 @@ def read_push(path: Path) -> PushDocument:
     Raises:
         BadInput: the file is damaged, or of another push.
     """
-    found = read_document(path, PushDocument, remedy=_REMEDY)
+    found = read_document(path, PushDocument, remedy=REMEDY)
     if f"{found.index:06d}" != path.stem:
-        raise BadInput(f"{path}: index is {found.index}: another push; {_REMEDY}.")
+        raise BadInput(f"{path}: index is {found.index}: another push; {REMEDY}.")
     return found
 
 

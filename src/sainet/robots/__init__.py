@@ -107,8 +107,17 @@ class RobotConfig:
         require(is_used or value == usual, name, f"left out unless {where}", value)
 
     def settings(self) -> Mapping[str, object]:
-        """Return every setting as a JSON value, for run folders."""
-        found = asdict(self) | {"config": self.config and str(self.config)}
+        """Return every setting as a JSON value, for run folders.
+
+        Raises:
+            BadInput: the configuration of the cell cannot be used.
+        """
+        found = asdict(self)
+        if self.config is not None:
+            from sainet.robots.wire.connect import configured_cell
+
+            # The file may move, and the arm may be repaired, between resumptions.
+            found["config"] = configured_cell(self).digest
         del found["dry_run"]
         return found
 

@@ -18,7 +18,8 @@ from robots.wire.real_controller import RealController
 from sainet.cli.entry import run
 from sainet.control.collect import SUMMARY, collect, push_file, summary_of
 from sainet.control.collected import read_push
-from sainet.control.config import CollectConfig
+from sainet.control.config import CollectConfig, ControlConfig
+from sainet.control.trials import run_trials
 from sainet.robots import RobotConfig, make_robot
 from sainet.robots.wire.abb import AbbRobot
 from sainet.robots.wire.cell import Cell, read_cell
@@ -119,6 +120,30 @@ def test_the_number_of_disks_is_that_of_the_cell(tmp_path):
     path.write_text(text.replace(second[0], ""))
     with pytest.raises(BadInput, match=r"cell.toml: it has 1 \[\[disks\]\], not 2"):
         make_robot(RobotConfig(robot="abb", config=path), 0)
+
+
+def test_a_session_knows_its_cell_by_its_disks_and_not_by_its_path(tmp_path):
+    def settings(name: str, old: str = "", new: str = "") -> object:
+        path = tmp_path / name
+        path.write_text(EXAMPLE.read_text().replace(old, new, 1))
+        return RobotConfig(robot="abb", config=path).settings()
+
+    known = settings("cell.toml")
+    assert known == settings("moved.toml")
+    assert known == settings("cell.toml", "hold_s = 1.0", "hold_s = 2.0")
+    assert known != settings("cell.toml", "radius_mm = 52.5", "radius_mm = 54.0")
+
+
+@pytest.mark.parametrize("text", [None, "surface = 1"])
+def test_a_cell_that_cannot_be_read_leaves_no_run_folder(tmp_path, text):
+    path, out = tmp_path / "cell.toml", tmp_path / "out"
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(BadInput, match="cell.toml: "):
+        collect(CollectConfig(robot="abb", config=path), out)
+    with pytest.raises(BadInput, match="cell.toml: "):
+        run_trials(ControlConfig(robot="abb", config=path, model="physics"), out)
+    assert not out.exists()
 
 
 def test_the_operator_confirms_on_the_terminal(monkeypatch, capsys):

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from sainet.robots.wire.frames import Rigid, fit_rigid, residuals
 from sainet.robots.wire.limits import FEEDBACK_AGE, LAG, LINE_LIMIT, SPEED_LIMIT, Limits
 from sainet.robots.wire.transport import LARGEST_PORT, LOOPBACK
-from sainet.runs.documents import read_document
+from sainet.runs.documents import content_hash, read_document
 from sainet.scenes.quantities import FRICTION, MASS, PUSHER_RADIUS, RADIUS
 from sainet.scenes.scene import Scene
 
@@ -209,6 +209,12 @@ class Cell(_Section, frozen=True, kw_only=True):
         """Check the names of the bodies."""
         if len({disk.body for disk in self.disks}) < len(self.disks):
             raise ValueError("two disks have the same body")
+
+    @property
+    def digest(self) -> str:
+        """The hash of what recordings depend on, not of how the arm is reached."""
+        parts = self.surface, self.disks, self.pusher, self.frictions, self.calibration
+        return content_hash(msgspec.json.encode(parts))
 
     @property
     def limits(self) -> Limits:

@@ -27,6 +27,16 @@ def abb_robot(config: RobotConfig, *_seed: int) -> AbbRobot:
     Raises:
         BadInput: the configuration cannot be used, or the tracker names other bodies.
     """
+    show = show_command if config.dry_run else None
+    return connect(configured_cell(config), show=show)
+
+
+def configured_cell(config: RobotConfig) -> Cell:
+    """Return the configuration of the cell of a physical robot.
+
+    Raises:
+        BadInput: it cannot be used, or lists another number of disks.
+    """
     assert config.config is not None
     cell = read_cell(config.config)
     if len(cell.disks) != config.disks:
@@ -34,7 +44,7 @@ def abb_robot(config: RobotConfig, *_seed: int) -> AbbRobot:
             f"{config.config}: it has {len(cell.disks)} [[disks]], not {config.disks}; "
             "list every disk on the table, the pushed one first."
         )
-    return connect(cell, show=show_command if config.dry_run else None)
+    return cell
 
 
 def show_command(time: float, position: Float[np.ndarray, "3"]) -> None:
