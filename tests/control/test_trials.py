@@ -31,6 +31,7 @@ from sainet.runs.errors import (
     BadInput,
     BadSetting,
     RunConflict,
+    SainetError,
     UnknownName,
 )
 from sainet.runs.folders import CONFIG as CONFIG_FILE
@@ -174,6 +175,33 @@ def test_an_interrupted_episode_is_kept_separately(tmp_path, monkeypatch):
         run_trials(CONFIG, tmp_path / "out")
     left = json.loads((tmp_path / "out/episodes/000.interrupted.json").read_text())
     assert left["reason"] == "interrupted"
+    assert not episode_file(tmp_path / "out", 0).exists()
+
+
+def test_an_error_keeps_the_pushes_and_asks_the_robot_nothing_more(
+    tmp_path, monkeypatch
+):
+    observe, truth, seen = SimulatedRobot.observe, SimulatedRobot.truth, []
+
+    def lose(self):
+        seen.append(1)
+        if len(seen) > 2:
+            raise SainetError("the disks cannot be measured at rest.")
+        return observe(self)
+
+    def ask(self):
+        assert len(seen) < 2, "asked after the last observation"
+        return truth.fget(self)
+
+    monkeypatch.setattr(SimulatedRobot, "observe", lose)
+    monkeypatch.setattr(SimulatedRobot, "truth", property(ask))
+    with pytest.raises(SainetError, match="at rest"):
+        run_trials(replace(CONFIG, pushes=5), tmp_path / "out")
+    left = json.loads((tmp_path / "out/episodes/000.interrupted.json").read_text())
+    assert (left["reason"], left["pushes"]) == (
+        "the disks cannot be measured at rest.",
+        2,
+    )
     assert not episode_file(tmp_path / "out", 0).exists()
 
 

@@ -144,23 +144,28 @@ class Finished(msgspec.Struct):
 
 
 def record(
-    config: ControlConfig, index: int, trial: Trial, episode: Episode
+    config: ControlConfig,
+    index: int,
+    trial: Trial,
+    episode: Episode,
+    end: State | None = None,
 ) -> EpisodeRecord:
     """Return the record of an episode; lengths in mm, angles in degrees.
 
-    `solved` uses the true pose, not the measured pose, which is noisy. NaN and infinity
-    become None.
+    Where no `end` is given, `solved` uses the true pose, not the measured pose, which
+    is noisy. NaN and infinity become None.
     """
     task, robot = trial.task, trial.robot
+    end = end or robot.truth
     return EpisodeRecord(
         trial=index,
         model=config.model,
         goals=config.goals,
         reason=episode.reason,
-        solved=bool(task.is_solved(robot.scene, robot.truth)),
-        final_mm=_known(1000 * float(task.distance(robot.truth))),
+        solved=bool(task.is_solved(robot.scene, end)),
+        final_mm=_known(1000 * float(task.distance(end))),
         pushes=len(episode.steps),
-        final=listed_poses(poses_of(robot.truth)),
+        final=listed_poses(poses_of(end)),
         decision_s=[step.seconds for step in episode.steps],
         goal_mm=_mm(task.goal),
         moved=task.moved,

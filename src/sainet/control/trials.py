@@ -34,7 +34,7 @@ from sainet.models.model import Model
 from sainet.planning import make_planner
 from sainet.planning.base import AbstractPlanner
 from sainet.runs.documents import write_document
-from sainet.runs.errors import BadInput, require
+from sainet.runs.errors import BadInput, SainetError, require
 from sainet.runs.folders import open_run
 from sainet.runs.shards import Shard, collect, open_share
 from sainet.runs.workers import each_done
@@ -149,7 +149,7 @@ def run_trial(
 ) -> int:
     """Run and record one episode (the job of a worker) and return its index.
 
-    The record of an interrupted episode has another name.
+    The record of an episode that Ctrl-C or an error ended has another name.
     """
     model, planner = prepare(config, own)
     trial, episode = make_trial(config, index), Episode()
@@ -167,9 +167,11 @@ def run_trial(
                 episode=episode,
                 adaptation=Adaptation(model, trial.scene) if config.adapt else None,
             )
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SainetError) as error:
+            episode.reason = str(error) or episode.reason
             left = path.with_suffix(".interrupted.json")
-            write_document(left, record(config, index, trial, episode))
+            # A robot that cannot observe must not be asked where the disks are now.
+            write_document(left, record(config, index, trial, episode, episode.final))
             raise
     write_document(path, record(config, index, trial, episode))
     path.with_suffix(".interrupted.json").unlink(missing_ok=True)
