@@ -1,6 +1,8 @@
 """The session behind the page: its physics is that of the robot and the episode."""
 
+import fcntl
 import math
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +14,7 @@ from sainet.control.record import poses_of
 from sainet.control.trial import make_trial
 from sainet.models.library import load_model
 from sainet.planning import make_planner
+from sainet.report.live.album import Album
 from sainet.report.live.config import PlayConfig
 from sainet.report.live.messages import (
     Aim,
@@ -30,7 +33,7 @@ from sainet.report.live.predictions import Difference, push_at
 from sainet.report.live.session import Session
 from sainet.report.live.views import Moved
 from sainet.robots import make_robot
-from sainet.runs.errors import BadInput, BadSetting
+from sainet.runs.errors import BadInput, BadSetting, RunConflict
 from sainet.studies.run_report import page_of
 
 SEED = 3
@@ -170,6 +173,24 @@ def test_episodes_are_saved_for_a_report_and_never_overwritten(session):
     later.act(PUSH)
     later.act(Save())
     assert len(list((out / "episodes").glob("*.json"))) == 3
+
+
+def test_two_pages_do_not_save_to_one_folder(session):
+    session.act(PUSH)
+    session.act(Save())
+    # A descriptor of its own has locks of its own, as another process has.
+    other, kind = (
+        os.open(session.config.out, os.O_RDONLY),
+        fcntl.LOCK_EX | fcntl.LOCK_NB,
+    )
+    with pytest.raises(BlockingIOError):
+        fcntl.flock(other, kind)
+    session.album = Album(session.config.out)  # lets the folder go
+    fcntl.flock(other, kind)
+    with pytest.raises(RunConflict, match="another sainet process"):
+        session.act(Save())
+    os.close(other)
+    session.act(Save())
 
 
 def test_another_run_folder_is_left_alone(session):

@@ -18,7 +18,7 @@ from sainet.control.record import (
 )
 from sainet.control.trial import Trial
 from sainet.runs.documents import write_document
-from sainet.runs.folders import open_run
+from sainet.runs.folders import RunFolder, open_run
 
 CHOSEN = "chosen"  # goals of the user
 _ENDED = "ended by the user"
@@ -52,6 +52,7 @@ class Album:
         self.out = out
         self._records: list[EpisodeRecord] = []
         self._first: int | None = None  # number of the first one in the folder
+        self._folder: RunFolder | None = None  # keeps its lock from the first save on
 
     def __len__(self) -> int:
         """Return the number of finished episodes."""
@@ -66,21 +67,19 @@ class Album:
         """Write all episodes, the current one as it is, and return their number.
 
         Raises:
-            RunConflict: the folder belongs to another run.
+            RunConflict: the folder belongs to another run, or another page uses it.
             BadInput: the folder cannot be written.
         """
         records = [*self._records, *([current.record] if current.episode.steps else [])]
         if not records:
             return 0
-        folder = open_run(self.out, {"command": "play"}, finished_by=SUMMARY)
+        folder = self._folder = open_run(self.out, {"command": "play"}, finished_by="")
         if self._first is None:
             self._first = len(episode_files(folder.path))
         for number, each in enumerate(records, start=self._first):
             path = episode_file(folder.path, number)
             write_document(path, msgspec.structs.replace(each, trial=number))
-        names = [
-            f"{FOLDER}/{number:03d}.json"
-            for number in range(self._first + len(records))
-        ]
+        count = self._first + len(records)
+        names = [f"{FOLDER}/{number:03d}.json" for number in range(count)]
         write_document(folder.path / SUMMARY, Finished(names))
         return len(records)
