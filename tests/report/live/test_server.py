@@ -68,6 +68,11 @@ def test_the_page_needs_nothing_from_elsewhere(page):
     assert get(page, "/play.html.j2")[0] == 404
 
 
+def test_an_address_with_colons_is_in_brackets_as_browsers_name_it():
+    hosts = PlayConfig(host="2001:db8::5", name=("robot:80",)).hosts(8642)
+    assert {"[2001:db8::5]", "[2001:db8::5]:8642", "robot:80"} <= hosts
+
+
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "localhost.evil"])
 def test_other_host_names_are_refused(page, host):
     assert get(page, Host=host)[0] == 403

@@ -58,5 +58,6 @@ class PlayConfig(TableConfig):
 
     def hosts(self, port: int) -> frozenset[str]:
         """Return the values that the header Host may have."""
-        names = {*LOOPBACK, self.host, *self.name}
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        names = {*LOOPBACK, host, *self.name}
         return frozenset(names | {f"{name}:{port}" for name in names})
