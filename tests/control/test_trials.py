@@ -151,6 +151,14 @@ def test_a_network_trained_again_is_another_model(tmp_path):
         run_trials(config, out)
 
 
+def test_a_folder_of_a_network_may_be_spelled_otherwise(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    net = write_network(tmp_path / "net", seed=0)
+    config = replace(CONFIG, model=str(net), trials=1, pushes=1)
+    first = run_trials(config, "out")
+    assert run_trials(replace(config, model="net"), "out") == first
+
+
 def test_an_engine_identified_again_is_another_model(tmp_path, monkeypatch):
     monkeypatch.setattr(trials, "run_episode", lambda *args, **settings: None)
     mine, out = tmp_path / "mine", tmp_path / "out"

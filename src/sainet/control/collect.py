@@ -81,8 +81,9 @@ def collect(
         SainetError: the robot failed several times in a row.
     """
     model = _planning_model(config)
-    known = {"command": "record", "weights": model and model.digest}
-    settings = {**known, **config.settings()}
+    name = model.name if model else config.model  # not the spelling of its folder
+    known = {"command": "record", "weights": model and model.digest, "model": name}
+    settings = {**config.settings(), **known}
     folder = open_run(out, settings, finished_by=SUMMARY)
     if not folder.is_finished:
         _record(config, out, model, on_pushes)

@@ -108,7 +108,9 @@ def _with_model(
 
 def _settings(model: Model, config: ControlConfig) -> dict[str, object]:
     """Return the settings that decide the episodes, as JSON values."""
-    return {"command": "control", "weights": model.digest, **config.settings()}
+    # Its folder may be spelled in several ways.
+    known = {"weights": model.digest, "model": model.name}
+    return {"command": "control", **config.settings(), **known}
 
 
 def run_share(
