@@ -2,12 +2,14 @@
 
 import os
 import signal
+from pathlib import Path
 
 import pytest
 
 from sainet import cli
 from sainet.cli import entry
 from sainet.cli.datasets import Generate
+from sainet.cli.evaluate import Evaluate
 from sainet.cli.output import Output, progress_bar
 from sainet.runs.interrupts import raise_if_interrupted, remembered_interrupts
 
@@ -56,6 +58,17 @@ def test_a_swallowed_interrupt_ends_the_command(
     assert len(done) == steps
     line = "sainet: interrupted; the same command resumes.\n"
     assert capsys.readouterr().err.endswith(line)
+
+
+@pytest.mark.parametrize(("out", "verb"), [(None, "starts over"), ("x", "resumes")])
+def test_an_evaluation_with_a_folder_resumes(out, verb, monkeypatch, capsys):
+    command = Evaluate(data=Path("data"), out=out and Path(out))
+    monkeypatch.setattr(
+        Evaluate, "run", lambda self: signal.raise_signal(signal.SIGINT)
+    )
+    monkeypatch.setattr(entry, "parse", lambda words: command)
+    assert entry.run(["anything"]) == entry.INTERRUPTED
+    assert capsys.readouterr().err.endswith(f"the same command {verb}.\n")
 
 
 def test_the_next_command_in_this_process_is_not_interrupted():

@@ -63,10 +63,10 @@ _DESCRIPTION = """Simulator-augmented interaction networks for pushed disks.
 Start with 'sainet demo', which runs the whole method at small scale."""
 
 INTERRUPTED = 130
-# Commands that an identical call resumes.
+# Commands that an identical call resumes, if they have a folder.
 _RESUMABLE = (
     *(Demo, Generate, Record, Import, Split, Train, Tune, Control, Reproduce),
-    CrossValidate,
+    *(CrossValidate, Evaluate),
 )
 
 
@@ -109,7 +109,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
             print(f"sainet: {message(each, command_type)}", file=sys.stderr)
         return error.exit_status
     except KeyboardInterrupt:
-        verb = "resumes" if isinstance(command, _RESUMABLE) else "starts over"
+        is_kept = getattr(command, "out", True) is not None
+        resumes = is_kept and isinstance(command, _RESUMABLE)
+        verb = "resumes" if resumes else "starts over"
         print(f"sainet: interrupted; the same command {verb}.", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
