@@ -78,3 +78,11 @@ def test_the_lab_is_a_robot_and_no_world(tmp_path, capsys):
         "virtual lab.\n"
     )
     assert not out.exists()
+
+
+def test_a_film_of_a_shard_is_refused(tmp_path, capsys):
+    words = ["control", "--shard", "1/2", "--animate", "--out", str(tmp_path / "out")]
+    assert called(words) == 2
+    said = "sainet: --animate is True; it must be left out with a shard.\n"
+    assert capsys.readouterr().err == said
+    assert not (tmp_path / "out").exists()

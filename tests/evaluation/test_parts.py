@@ -83,6 +83,8 @@ def test_bad_shards_end_in_one_line(words, tmp_path, capsys):
     cases = [
         ([*words, "--shard", "1/2"], "--out is missing; give the folder"),
         ([*there, "--shard", "2/2", "--steps", "6"], "steps is 5, not 6"),
+        ([*there, "--shard", "1/2", "--table", "a.md"], "--table is a.md; it must be"),
+        ([*there, "--shard", "1/2", "--page", "a.html"], "--page is a.html; it must"),
         ([*there, "--shard", "2"], "--shard is 2; it must be a number and a count"),
     ]
     for bad, message in cases:

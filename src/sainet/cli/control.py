@@ -46,6 +46,7 @@ class Control:
     def run(self) -> Json:
         """Run the trials, or those of a shard, and print their outcome."""
         self.config.check_used()
+        self.machines.refuse_with_shard(animate=self.animate)
         use_cache()
         from sainet.control.trials import measure_trials, prepare
         from sainet.evaluation.trials import trial_rows

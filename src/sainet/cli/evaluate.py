@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.report import WRITERS
-from sainet.runs.errors import BadInput, require, require_one_of
+from sainet.runs.errors import BadInput, require_one_of
 from sainet.runs.executors import Machines
 from sainet.runs.shards import Shard
 from sainet.runs.workers import each_done
@@ -65,6 +65,10 @@ class Evaluate:
             require_one_of("table", self.table.suffix, WRITERS)
         if self.page is not None:
             require_one_of("page", self.page.suffix, (".html",))
+        machines = self.machines
+        machines.refuse_with_shard(
+            scheduler=machines.scheduler, table=self.table, page=self.page
+        )
         use_devices(self.devices)
         from sainet.datasets.store import open_part
         from sainet.evaluation.abstention import measure, with_abstaining
@@ -80,9 +84,7 @@ class Evaluate:
         rows = with_abstaining(models) if self.abstain else models
         for warning in unlike_pushes(models, store):
             self.output.warn(warning)
-        if (shard := self.machines.share) is not None:
-            nobody = self.machines.scheduler
-            require(nobody is None, "scheduler", "left out with a shard", nobody)
+        if (shard := machines.share) is not None:
             return self._measure_share(models, store, shard)
         measured = measure(rows, store, lambda plain: self._measure(plain, store))
         summary = summarise(measured)

@@ -21,7 +21,7 @@ from functools import partial
 from importlib.util import find_spec
 from typing import Any, final
 
-from sainet.runs.errors import BadInput, SainetError, missing_extra
+from sainet.runs.errors import BadInput, SainetError, missing_extra, require
 from sainet.runs.interrupts import forget_interrupts, remember_interrupt
 from sainet.runs.manifest import code_versions, use_cache
 from sainet.runs.shards import Shard
@@ -53,6 +53,12 @@ class Machines:
             BadSetting: the text names no shard.
         """
         return None if self.shard is None else Shard.parse(self.shard)
+
+    def refuse_with_shard(self, **others: object) -> None:
+        """Raise `BadSetting` for an option that a shard would ignore."""
+        for name, value in others.items():
+            is_fine = self.shard is None or not value
+            require(is_fine, name, "left out with a shard", value)
 
     @contextmanager
     def executor(
