@@ -31,10 +31,13 @@ from sainet.engines.base import roll_out
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.levels import roll_pushes
 from sainet.robots.wire.abb import AbbRobot, NoPose
-from sainet.robots.wire.arm import AbstractArm, DryArm
+from sainet.robots.wire.arm import AbstractArm, DryArm, Stroke
 from sainet.robots.wire.cell import Cell, read_cell
+from sainet.robots.wire.disks import Measurement
+from sainet.robots.wire.executed import Execution
 from sainet.robots.wire.guidance import EgmArm
 from sainet.robots.wire.limits import CYCLE
+from sainet.robots.wire.route import plan_route
 from sainet.robots.wire.transport import UdpTransport
 from sainet.robots.wire.vicon import ViconStream
 from sainet.runs.errors import BadInput
@@ -347,6 +350,17 @@ def test_disks_that_still_move_and_a_disk_that_does_not_are_reported():
     with loop() as made:
         made.robot.observe()
         assert made.robot.push(little).trouble == "disk 1 did not move"
+
+
+def test_a_slow_tracker_also_sees_disks_that_still_move():
+    cell = replace(CELL, tracker=replace(CELL.tracker, rate_hz=10.0))
+    state = at_rest(jnp.float32(TABLE[:, :2]), jnp.float32(TABLE[:, 2]), jnp.zeros(2))
+    found = [Measurement(i, i / 10, TABLE + [0.003 * i, 0, 0]) for i in range(4)]
+    tip = TO_ROBOT.moved(np.array([*TIP, 0.06]))
+    route = plan_route(cell, cell.scene, tip, state, PUSH)
+    stroke = Stroke.of([(0.0, tip, tip)])
+    executed = Execution(cell, state, PUSH, route, stroke, found)
+    assert "come to rest" in executed.problem
 
 
 def test_a_dry_run_shows_every_command_and_sends_none():

@@ -46,7 +46,7 @@ class Execution:
         disks, poses = self.cell.disks, np.array([each.pose for each in self.found])
         if reason := disturbance(disks, self.state, self.found[:1]):
             return reason
-        last = round(_REST_TIME * self.cell.tracker.rate_hz)
+        last = max(round(_REST_TIME * self.cell.tracker.rate_hz), 2)
         if unrest(disks, poses[-last:]) > REST:
             return "the disks did not come to rest; lengthen motion.hold_s"
         if moved(disks, poses[0], poses[-1])[0] < _STILL:
