@@ -262,6 +262,18 @@ def test_an_unknown_system_is_reported():
         assert "none at 127.0.0.1: Unknown" in wait(tracker)[0].trouble
 
 
+def test_whatever_the_package_raises_is_reported(monkeypatch):
+    def fail():
+        raise ValueError("bad stream")
+
+    package = SimpleNamespace(
+        connect=lambda kind, settings: SimpleNamespace(waitForNextFrame=fail)
+    )
+    monkeypatch.setitem(sys.modules, "motioncapture", package)
+    with closing(MotionCapture("vrpn", "127.0.0.1")) as tracker:
+        assert wait(tracker)[0].trouble == "vrpn at 127.0.0.1: bad stream"
+
+
 def test_motion_capture_gives_the_poses_of_the_package(monkeypatch):
     turn = Rotation.from_euler("XYZ", [0.3, -0.2, 2.0])
     x, y, z, w = 2 * turn.as_quat()  # of any length

@@ -63,7 +63,7 @@ class MotionCapture(AbstractTracker):
                 connection.waitForNextFrame()
                 bodies = connection.rigidBodies.items()
                 self._add({name: _pose(body) for name, body in bodies})
-        except RuntimeError as error:
+        except Exception as error:  # whatever the package raises
             self._add({}, f"{system} at {host}: {error}")
 
     def _add(self, poses: dict[str, Rigid], trouble: str = "") -> None:
