@@ -54,6 +54,7 @@ FAULTS = {
     "one body twice": ('"disk-2"', '"disk-1"', "body"),
     "every address": ('listen = "127.0.0.1"', 'listen = "0.0.0.0"', "listen"),
     "no address": ('host = "127.0.0.1"', 'host = "robot"', "controller.*host"),
+    "IPv6": ('host = "127.0.0.1"', 'host = "::1"', "'::1'; it must be one IPv4"),
     "port": ("port = 6510", "port = 0", "controller.port"),
     "residual": ("[700.0, 0.0, 100.0]", "[703.0, 0.0, 100.0]", r"residual of 2.25 mm"),
     "height of a point": ("[700.0, 0.0, 100.0]", "[700.0, 0.0, 106.0]", "residual of"),

@@ -4,7 +4,7 @@ Names of fields carry their unit. Every field is checked when the file is read: 
 anything listens, sends or moves.
 """
 
-from ipaddress import ip_address
+from ipaddress import IPv4Address
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -42,7 +42,7 @@ class _Section(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 class _Peer(_Section, frozen=True, kw_only=True):
     """Where a device is, and where this computer listens for it."""
 
-    host: str = LOOPBACK  # address of the device; packets of others are ignored
+    host: str = LOOPBACK  # address of the device; a packet of another one stops a push
     listen: str = LOOPBACK  # address of this computer
 
     def __post_init__(self) -> None:
@@ -50,11 +50,11 @@ class _Peer(_Section, frozen=True, kw_only=True):
         for name in ("host", "listen"):
             value = getattr(self, name)
             try:
-                unusable = ip_address(value).is_unspecified
+                unusable = IPv4Address(value).is_unspecified
             except ValueError:
                 unusable = True
             if unusable:
-                raise ValueError(f"{name} is '{value}'; it must be one IP address")
+                raise ValueError(f"{name} is '{value}'; it must be one IPv4 address")
 
 
 class Controller(_Peer, frozen=True, kw_only=True):
