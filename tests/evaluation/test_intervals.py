@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sainet.evaluation.intervals import Folds, Sample
+from sainet.evaluation.metrics import ModelErrors
 
 
 def test_pushes_of_one_fold_are_correlated():
@@ -74,6 +75,22 @@ def test_ratios_of_labs_are_positive_and_paired():
     other = Sample(rng.uniform(1, 2, (20, 1)), labs)
     value, low, high = Sample(one[:, None], labs).over(other)
     assert 0 < low[0] < value[0] < high[0]
+
+
+def test_a_ratio_to_two_unlike_training_runs_has_no_upper_end():
+    errors = np.random.default_rng(7).gamma(4, 1, (300, 1))
+    engine, alike, unlike = (
+        Sample(scales * errors)
+        for scales in (2.0, np.reshape([1, 1.01], (2, 1, 1)), [[[1.0]], [[1.3]]])
+    )
+    for below, is_known in ((alike, True), (unlike, False)):
+        value, low, high = engine.over(below, trained_apart=True)
+        assert 0 < low[0] < value[0]
+        assert np.isfinite(high[0]) == is_known
+    # An error is never negative, nor is its ratio to another.
+    errors = ModelErrors({"pos_mm": unlike.values}, errors, 1.0)
+    assert errors.mean("pos_mm")[1][0] == 0
+    assert unlike.over(engine)[1][0] == 0
 
 
 def test_quantities_and_training_runs_stay_apart():

@@ -79,6 +79,15 @@ def test_errors_are_drawn_over_those_of_physics(tmp_path, drawn):
     assert shares == {0.25, 1 / 5, 0.5, 0.7}  # ours, its interval, the published one
 
 
+def test_an_interval_without_upper_end_reaches_the_edge(tmp_path, drawn):
+    summary = of_errors()
+    engine, sain = summary.factors
+    sain = msgspec.structs.replace(sain, factor=Estimate(4.0, 2.0))
+    summary = msgspec.structs.replace(summary, factors=(engine, sain))
+    draw_errors_over_physics([Part("One", summary)], tmp_path / "a.svg")
+    assert {x for x, _ in drawn} >= {0.0, 0.25, 0.5}
+
+
 def test_success_is_drawn_with_its_interval(tmp_path, drawn):
     row = TrialRow(
         condition="easy",

@@ -205,6 +205,21 @@ def test_a_verdict_counts_only_what_is_clear(error, words):
     assert words in printed(samples.summary(rows, factors=factors), width=200)
 
 
+@pytest.mark.parametrize(
+    ("low", "words"),
+    [
+        (0.8, "no clear difference (ratio 2.0 [0.80, –])"),  # noqa: RUF001
+        (1.2, "2.0 times as much [1.20, –]"),  # noqa: RUF001
+    ],
+)
+def test_an_unknown_upper_end_is_a_dash(low, words):
+    rows = [samples.row(name, 1, 1.0) for name in ("physics", "sain")]
+    ratio = Estimate(2.0, low)
+    open_ended = msgspec.structs.replace(samples.factor("sain", 1.8), factor=ratio)
+    factors = samples.factor("physics", 3.6), open_ended
+    assert words in printed(samples.summary(rows, factors=factors), width=200)
+
+
 def test_nothing_at_all_is_said_in_words():
     for text in (to_html(arrange(NOTHING)), markdown(NOTHING), printed(NOTHING)):
         assert "Nothing to show" in text

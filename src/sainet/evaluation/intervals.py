@@ -117,18 +117,24 @@ class Sample:
         return np.where(np.isnan(drawn).any(axis=0), np.nan, p)
 
     def over(self, other: "Sample", *, trained_apart: bool = False) -> Interval:
-        """Return the ratios of the means over the same pushes.
+        """Return the ratios of the means, none negative, over the same pushes.
+
+        The upper end is unknown where it would rest on denominators that are drawn
+        below zero: few training runs scatter widely.
 
         Args:
             other: the denominator.
             trained_apart: the denominators are of another model.
         """
-        drawn = self.drawn() / np.maximum(other.drawn(int(trained_apart)), _FLOOR)
+        below = other.drawn(int(trained_apart))
+        drawn = np.maximum(self.drawn(), 0) / np.maximum(below, _FLOOR)
         value = self.mean / np.maximum(other.mean, _FLOOR)
         widening = self._widening
         if widening != 1:  # of the logarithm: a ratio of few labs stays positive
             drawn = value * (drawn / value) ** widening
-        return value, *np.percentile(drawn, _ENDS, axis=0)
+        low, high = np.percentile(drawn, _ENDS, axis=0)
+        is_known = np.percentile(below, 100 - _ENDS[1], axis=0) > 0
+        return value, low, np.where(is_known, high, np.nan)
 
     @property
     def _widening(self) -> float:

@@ -65,8 +65,8 @@ class ModelErrors:
 
     def mean(self, name: str, factor: float = 1.0) -> Interval:
         """Return the mean of a measured error times a factor, with its interval."""
-        found = self.samples[name].interval
-        return found if factor == 1.0 else _times(found, factor)
+        value, low, high = self.samples[name].interval
+        return _times((value, np.maximum(low, 0), high), factor)
 
     def per_travel(self, name: str) -> Interval:
         """Return the mean of an error over the mean travel (%), with its interval.

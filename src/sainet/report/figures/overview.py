@@ -184,10 +184,10 @@ def _ratios(part: Part) -> Iterator[Dot]:
     published = _published_ratios(part)
     for each in factors:
         low, high = each.factor.low, each.factor.high
-        if each.model not in hidden and low and high:
+        if each.model not in hidden and low:
             ratio = each.error / each.baseline
             known = published.get(each.model)
-            yield Dot(styles[each.model], ratio, 1 / high, 1 / low, known)
+            yield Dot(styles[each.model], ratio, 1 / (high or np.inf), 1 / low, known)
 
 
 def _published_ratios(part: Part) -> dict[str, float]:
