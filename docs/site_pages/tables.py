@@ -281,7 +281,7 @@ def _comparisons(summary: Summary, labels: dict[str, str]) -> Grid:
 
 
 def _tests(summary: Summary, labels: dict[str, str]) -> Grid:
-    """Return every exact McNemar test."""
+    """Return every paired test."""
     headings = ("goals", "measure", "model", "against", "only the first")
     rows = [
         [
@@ -292,7 +292,7 @@ def _tests(summary: Summary, labels: dict[str, str]) -> Grid:
         for each in summary.tests
     ]
     columns = [*map(Column, (*headings, "only the other", "p"))]
-    return Grid("-tests", "Exact McNemar tests on the same goals", columns, rows)
+    return Grid("-tests", "Paired tests on the same goals", columns, rows)
 
 
 def _differences(summary: Summary, labels: dict[str, str]) -> Grid:

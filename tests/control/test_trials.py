@@ -22,8 +22,12 @@ from sainet.control.config import ControlConfig
 from sainet.control.record import SUMMARY, episode_file
 from sainet.control.trial import make_trial
 from sainet.control.trials import measure_trials, prepare, run_share, run_trials
+from sainet.evaluation import summary
+from sainet.evaluation.claims import solves_more
+from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
 from sainet.models.identity import ModelId
+from sainet.report.verdicts import trial_sentences
 from sainet.robots.simulated import PUSH_STEPS, SimulatedRobot
 from sainet.runs.documents import read_json, write_json
 from sainet.runs.errors import (
@@ -426,6 +430,22 @@ def test_pairs_are_compared_exactly():
     assert (found["only_one"], found["only_other"]) == (6, 0)
     assert found["p"] == pytest.approx(2 * 0.5**6)
     assert paired_test(one, one)["p"] == 1.0
+
+
+def test_trials_of_one_lab_are_not_independent():
+    """Models that differ in one of five labs only differ by chance."""
+    alike = records_of([True, False] * 10)
+    mine, theirs = ([*records_of([each] * 20), *4 * alike] for each in (True, False))
+    models = {ModelId(kind="in"): theirs, ModelId(kind="sain"): mine}
+    pooled, labs = measure_trials(models), np.repeat(np.arange(5, dtype=np.int32), 20)
+    data = pooled.data.assign_coords(fold=("sample", labs))
+    header = msgspec.structs.replace(pooled.header, has_labs=True)
+    found = summary.summarise(Measurements(data, header))
+    assert paired_test(mine, theirs)["p"] < 1e-5
+    assert solves_more("sain", "in", "")(found).status == "does not hold"
+    (p,) = (test.p for test in found.tests if test.measure == "solved")
+    assert p > 0.05
+    assert any(f"(p over labs = {p:.2g})" in each for each in trial_sentences(found))
 
 
 def test_pairs_are_compared_by_each_measure():

@@ -1,4 +1,4 @@
-"""Success of control trials, with its interval, and exact paired tests."""
+"""Success of control trials, with its interval, and paired tests."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Bool
 
+from sainet.evaluation.intervals import Folds, Sample, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
 
 # What an episode reaches or does not.
@@ -38,7 +39,10 @@ class TrialRow(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class TrialTest(msgspec.Struct, frozen=True, kw_only=True):
-    """An exact McNemar test of two models on the same goals."""
+    """A paired test of two models on the same goals: McNemar's, exact, or over labs.
+
+    Trials of one lab share a network and hidden properties: they are not independent.
+    """
 
     condition: str
     measure: str  # one of `MEASURES`
@@ -120,16 +124,14 @@ def reached(
 
 
 def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
-    from scipy.stats import binomtest
-
+    part = measured.data["fold"].values[measured.samples_of(condition)]
+    labs = folds_of(part, are_labs=True) if measured.header.has_labs else None
     tried = [s for s in measured.slugs if was_tried(measured, s, condition)]
     for measure in MEASURES:
         found = {s: reached(measured, s, condition, measure) for s in tried}
         for against, model in combinations(tried, 2):
             mine, theirs = found[model], found[against]
             only_one, only_other = (mine & ~theirs).sum(), (theirs & ~mine).sum()
-            unlike = int(only_one + only_other)
-            p = binomtest(int(only_one), unlike).pvalue if unlike else 1.0
             yield TrialTest(
                 condition=condition.label,
                 measure=measure,
@@ -137,5 +139,16 @@ def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
                 against=against,
                 only_one=int(only_one),
                 only_other=int(only_other),
-                p=float(p),
+                p=_chance(mine, theirs, labs),
             )
+
+
+def _chance(mine: np.ndarray, theirs: np.ndarray, labs: Folds | None) -> float:
+    """Return p, two-sided, that trials reach as much with either model."""
+    if labs and len(mine) > 1:
+        one, other = (Sample(x[:, None].astype(float), labs) for x in (mine, theirs))
+        return float(one.chance(other)[0])
+    from scipy.stats import binomtest
+
+    unlike = int((mine != theirs).sum())
+    return float(binomtest(int((mine & ~theirs).sum()), unlike).pvalue) if unlike else 1

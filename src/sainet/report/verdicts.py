@@ -114,12 +114,13 @@ def trial_sentences(summary: Summary) -> Iterator[str]:
                 f"{row.trials - row.solved} unsolved trials ended because the measured "
                 "pose was within the tolerance"
             )
+    p = "p over labs" if summary.differences else "exact McNemar p"
     for test in filter(_is_reported, summary.tests):
         yield (
             f"{test.condition}, {test.measure.replace('_', ' ')}: "
             f"only {labels[test.model]} {test.only_one}, "
             f"only {labels[test.against]} {test.only_other} "
-            f"(exact McNemar p = {test.p:.2g})"
+            f"({p} = {test.p:.2g})"
         )
     for each in summary.differences:
         found = each.difference
