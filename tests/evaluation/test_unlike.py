@@ -12,8 +12,9 @@ from sainet.datasets.groups import groups_of
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines import RECORDED
-from sainet.evaluation.coverage import Coverage, in_words
+from sainet.evaluation.coverage import MEASURED, Coverage, coverage_of, in_words
 from sainet.evaluation.intervals import Estimate
+from sainet.evaluation.measurements import Header, measurements_of
 from sainet.evaluation.unlike import (
     doubts_of_training,
     other_groups,
@@ -21,6 +22,7 @@ from sainet.evaluation.unlike import (
     other_worlds,
     unlike_pushes,
 )
+from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 
 
@@ -106,3 +108,26 @@ def test_regions_that_hold_clearly_too_few_ends_are_doubted(inside, is_doubted):
         ]
     )
     assert ("fewer than they promise" in sentence) == is_doubted
+
+
+@pytest.mark.parametrize(
+    ("held", "folds", "words"),
+    [
+        ([1] * 20, None, "hold 100 % [84, 100] of the final positions"),
+        ([0] * 2, None, "hold 0 % [0, 66] of the final positions"),
+        ([1] * 20, [0, 1] * 10, "hold 100 % [84, 100] of the final positions"),
+        ([1, 0] * 10, [0, 1] * 10, "hold 50 % [0, 100] of the final positions"),
+        ([1], None, "too few pushes"),
+    ],
+)
+def test_a_few_regions_that_all_hold_prove_little(held, folds, words):
+    """Wilson's interval; over folds the bootstrap, unless all are inside or outside."""
+    inside = np.array(held, float)[None, None, :, None]
+    errors = {name: np.ones_like(inside) for name in MEASURED} | {"inside_pos": inside}
+    rows = np.arange(len(held), dtype=np.int32)
+    header = Header(models=(ModelId(kind="gp"),))
+    found = measurements_of(errors, inside[0, 0], header, condition=0 * rows, row=rows)
+    if folds:
+        data = found.data.assign_coords(fold=("sample", np.array(folds, np.int32)))
+        found = replace(found, data=data)
+    assert words in in_words(coverage_of(found))[0]

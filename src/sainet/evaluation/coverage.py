@@ -14,7 +14,14 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.batch import PushBatch
-from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
+from sainet.evaluation.intervals import (
+    Estimate,
+    Interval,
+    Sample,
+    estimate,
+    folds_of,
+    wilson,
+)
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.evaluation.metrics import final_pose
 from sainet.models.correctors import CONFIDENCE, Region, interval_score
@@ -169,6 +176,19 @@ def _sentence(found: Coverage) -> str:
     )
 
 
+def _percent(inside: Sample) -> Interval:
+    """Return shares in percent: Wilson's interval, or that over folds and trainings.
+
+    A bootstrap of pushes that are all inside, or all outside, has no width.
+    """
+    share, *ends = inside.interval
+    is_plain = inside.folds is None and inside.values.ndim == 2  # noqa: PLR2004
+    takes_wilson = np.isfinite(ends[0]) & (is_plain | (share == 0) | (share == 1))
+    bounds = wilson(share, inside.values.shape[-2])
+    low, high = np.clip(np.where(takes_wilson, bounds, ends), 0, 1)
+    return 100 * share, 100 * low, 100 * high
+
+
 def _coverage(
     measured: Measurements, condition: Condition, slug: str, kind: str
 ) -> Sequence[Coverage]:
@@ -183,9 +203,7 @@ def _coverage(
     inside, size, score, plain = map(sample, (INSIDE, SIZE, SCORE, PLAIN))
     if not np.isfinite(inside.values).all() or not part.any():
         return []
-    value, low, high = inside.interval
-    share = 100 * value, 100 * low, 100 * high
-    intervals = (share, size.interval, score.interval, score.over(plain))
+    intervals = (_percent(inside), size.interval, score.interval, score.over(plain))
     return [
         Coverage(
             condition=condition.label,

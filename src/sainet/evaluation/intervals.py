@@ -178,6 +178,14 @@ def _shares_of_folds(folds: Folds) -> Float[np.ndarray, "sample push"]:
     return shares / shares.sum(axis=1, keepdims=True)
 
 
+def wilson(share: float | np.ndarray, count: int) -> Float[np.ndarray, "end *shares"]:
+    """Return both ends of Wilson's interval of shares of a number of things."""
+    squared = ndtri(_ENDS[1] / 100) ** 2 / count
+    half = np.sqrt(squared * (share * (1 - share) + squared / 4))
+    middle = share + squared / 2
+    return np.clip([middle - half, middle + half] / (1 + squared), 0, 1)
+
+
 class Estimate(msgspec.Struct, frozen=True):
     """A number with the ends of its 95 % interval; None where it is unknown."""
 

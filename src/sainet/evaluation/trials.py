@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 from jaxtyping import Bool
 
-from sainet.evaluation.intervals import Folds, Sample, folds_of
+from sainet.evaluation.intervals import Folds, Sample, folds_of, wilson
 from sainet.evaluation.measurements import Condition, Measurements
 
 # What an episode reaches or does not.
@@ -90,9 +90,7 @@ def _row(measured: Measurements, slug: str, condition: Condition) -> TrialRow:
     seconds = column("decision_s")
     seconds = seconds[np.isfinite(seconds)]
     median = float(np.median(column("final_mm")))
-    from scipy.stats import binomtest  # slow to import
-
-    interval = binomtest(int(solved.sum()), len(solved)).proportion_ci(method="wilson")
+    low, high = wilson(solved.mean(), len(solved))
     pushes = column("pushes")[solved]
     return TrialRow(
         condition=condition.label,
@@ -100,7 +98,7 @@ def _row(measured: Measurements, slug: str, condition: Condition) -> TrialRow:
         trials=len(solved),
         solved=int(solved.sum()),
         success=float(solved.mean()),
-        interval=(float(interval.low), float(interval.high)),
+        interval=(float(low), float(high)),
         median_pushes=float(np.median(pushes)) if solved.any() else None,
         median_decision_s=float(np.median(seconds)) if len(seconds) else None,
         within_4_mm=float(near.mean()),
@@ -148,7 +146,7 @@ def _chance(mine: np.ndarray, theirs: np.ndarray, labs: Folds | None) -> float:
     if labs and len(mine) > 1:
         one, other = (Sample(x[:, None].astype(float), labs) for x in (mine, theirs))
         return float(one.chance(other)[0])
-    from scipy.stats import binomtest
+    from scipy.stats import binomtest  # slow to import
 
     unlike = int((mine != theirs).sum())
     return float(binomtest(int((mine & ~theirs).sum()), unlike).pvalue) if unlike else 1
