@@ -109,7 +109,8 @@ def test_edited_measurements_are_refused(tmp_path):
         edited = opened.load() * 1
     edited["pos_mm"] *= 0.1
     attributes = opened.attrs
-    for kept in (attributes, {"header": attributes["header"]}):
+    header = {"header": attributes["header"]}
+    for kept in (attributes, header | {"seal": 5}, header):
         edited.attrs = kept
         data = edited.to_netcdf(engine="scipy")
         path.write_bytes(bytes(data))

@@ -270,7 +270,7 @@ def read_measurements(path: Path) -> Measurements:
         data = _unpack(packed) if path.suffix == ".xz" else packed
         with xr.open_dataset(io.BytesIO(data), engine="scipy") as opened:
             dataset = opened.load()
-        header, seal = dataset.attrs.pop(_HEADER), dataset.attrs.pop(_SEAL, "")
+        header, seal = dataset.attrs.pop(_HEADER), str(dataset.attrs.pop(_SEAL, ""))
         found = Measurements(dataset, msgspec.json.decode(header, type=Header))
     except Exception as cause:  # SciPy raises arbitrary exceptions on corrupt files
         reason = " ".join(str(cause).split())[:200] or type(cause).__name__
