@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student_t
 
+from sainet.datasets.store import last_known
 from sainet.evaluation.as_json import to_json_object
 from sainet.evaluation.intervals import Sample
 from sainet.evaluation.joining import pool_trainings
@@ -12,7 +13,6 @@ from sainet.evaluation.metrics import (
     MEASURED,
     ModelErrors,
     final_errors,
-    final_pose,
     push_errors,
     travel_mm,
 )
@@ -96,14 +96,14 @@ def test_unobserved_pushes_have_unknown_errors(poses):
     errors = push_errors(predicted, np.full_like(true, np.nan), observed)
     for values in errors.values():
         assert not np.isfinite(values)[3].any()
-    ends = final_pose(true, observed)
+    ends = last_known(true, observed)
     assert np.isnan(ends[3]).all()
     assert np.isfinite(np.delete(ends, 3, axis=0)).all()
 
 
 def test_final_poses_are_the_last_observed_poses(poses):
     _, true, observed = poses
-    for push, pose in enumerate(final_pose(true, observed)):
+    for push, pose in enumerate(last_known(true, observed)):
         last = max(np.flatnonzero(observed[push]))
         np.testing.assert_array_equal(pose, true[push, last])
 

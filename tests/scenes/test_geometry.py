@@ -39,3 +39,5 @@ def test_wrapped_angles_are_equal_directions_within_a_turn():
     assert (wrapped >= -jnp.pi).all()
     assert (wrapped < jnp.pi).all()
     np.testing.assert_allclose(unit(wrapped), unit(angles), atol=1e-5)
+    exact = wrap_angle(np.array([np.pi, -np.pi, 7.0]))  # in NumPy's precision
+    np.testing.assert_allclose(exact, [-np.pi, -np.pi, 7.0 - 2 * np.pi], rtol=1e-14)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import msgspec
 import numpy as np
 
+from sainet.control.record import listed
 from sainet.datasets.recorded.checks import recording_problems
 from sainet.datasets.recorded.importing import import_pushes
 from sainet.datasets.recorded.properties import Properties
@@ -60,7 +61,7 @@ class Place(msgspec.Struct, frozen=True, kw_only=True):
     def of(cls, state: State) -> "Place":
         """Return the poses of a state."""
         pose = np.column_stack([state.position, state.angle])
-        return cls(pose=_listed(pose), pusher=_listed(state.pusher_position))
+        return cls(pose=listed(pose), pusher=listed(state.pusher_position))
 
     def state(self) -> State:
         """Return the state at rest."""
@@ -118,13 +119,13 @@ class PushDocument(msgspec.Struct, frozen=True, kw_only=True):
             arranged=arranged,
             observed=Place.of(observed),
             left=Place.of(robot.truth),
-            mass=_listed(robot.scene.mass),
-            radius=_listed(robot.scene.radius),
+            mass=listed(robot.scene.mass),
+            radius=listed(robot.scene.radius),
             pusher_radius=float(robot.scene.pusher_radius),
-            goal=None if goal is None else _listed(goal),
-            time=_listed(recording.time, _DIGITS),
-            pose=_listed(recording.pose, _DIGITS),
-            pusher=_listed(recording.pusher, _DIGITS),
+            goal=None if goal is None else listed(goal),
+            time=listed(recording.time, _DIGITS),
+            pose=listed(recording.pose, _DIGITS),
+            pusher=listed(recording.pusher, _DIGITS),
             commanded=None if push is None else Command.of(push),
             surface=conditions.surface,
             speed_mm_s=conditions.speed_mm_s,
@@ -236,11 +237,3 @@ def _reason(recording: Recording, properties: Properties) -> str:
 def _array(values: list[Any]) -> np.ndarray:
     """Return numbers in double precision, NaN for None."""
     return np.array(values, np.float64)
-
-
-def _listed(values: object, digits: int | None = None) -> list[Any]:
-    """Return numbers, None for NaN and infinity; rounded, or exact."""
-    found = np.asarray(values, np.float64)
-    numbers = (found if digits is None else np.round(found, digits)).astype(object)
-    numbers[~np.isfinite(found)] = None
-    return numbers.tolist()

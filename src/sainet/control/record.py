@@ -263,17 +263,17 @@ def _known(value: float) -> float | None:
 
 def listed_poses(pose: Float[np.ndarray, "*shape 3"]) -> list[Any]:
     """Return x and y in mm and the angle in degrees, rounded to 0.01."""
-    return _rounded(pose, np.array([1000, 1000, np.rad2deg(1)]))
+    return listed(np.asarray(pose, np.float64) * [1000, 1000, np.rad2deg(1)], 2)
 
 
 def _mm(metres: object) -> list[Any]:
-    return _rounded(metres, 1000)
+    return listed(1000 * np.asarray(metres, np.float64), 2)
 
 
-def _rounded(values: object, unit: np.ndarray | int) -> list[Any]:
-    """Return numbers rounded to 0.01 of a unit, None for NaN and infinity."""
-    found = np.round(np.asarray(values, np.float64) * unit, 2)
-    numbers = found.astype(object)
+def listed(values: object, digits: int | None = None) -> list[Any]:
+    """Return numbers, None for NaN and infinity; rounded, or exact."""
+    found = np.asarray(values, np.float64)
+    numbers = (found if digits is None else np.round(found, digits)).astype(object)
     numbers[~np.isfinite(found)] = None
     return numbers.tolist()
 

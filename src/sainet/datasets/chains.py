@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from sainet.datasets.store import Store, last_known
+from sainet.scenes.geometry import wrap_angle
 
 _SAME_PLACE = 3e-4  # m
 _SAME_ANGLE = np.deg2rad(1.0)  # rad
@@ -49,7 +50,7 @@ def continuations(
     started = np.concatenate([known[:0], *near]).astype(int)
     apart = start[started] - end[ended]
     far = np.hypot(apart[..., 0], apart[..., 1])
-    turned = np.abs(np.mod(apart[..., 2] + np.pi, 2 * np.pi) - np.pi)
+    turned = np.abs(wrap_angle(apart[..., 2]))
     same = ((far <= _SAME_PLACE) & (turned <= _SAME_ANGLE)).all(axis=1)
     return ended[same], started[same]
 

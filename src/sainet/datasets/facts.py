@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 
 from sainet.datasets.schema import Arrays, StoreInfo
 from sainet.datasets.store import Store, last_known
+from sainet.scenes.geometry import wrap_angle
 from sainet.scenes.quantities import PROPERTIES
 
 PATH_POINTS = 9  # of the pusher's path
@@ -129,8 +130,8 @@ def _of_contact(
     far = np.linalg.norm(pusher - pusher[:, :1], axis=-1).argmax(axis=1)
     heading = _angle(pusher[np.arange(len(start)), far] - pusher[:, 0])
     return {
-        "contact_angle": _wrapped(normal - axis),
-        "direction": _wrapped(heading - normal),
+        "contact_angle": wrap_angle(normal - axis),
+        "direction": wrap_angle(heading - normal),
     }
 
 
@@ -170,7 +171,3 @@ def _overlap(
 
 def _angle(vector: Float[np.ndarray, "push 2"]) -> Float[np.ndarray, " push"]:
     return np.arctan2(vector[:, 1], vector[:, 0])
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return np.mod(angle + np.pi, 2 * np.pi) - np.pi

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.batch import PushBatch
+from sainet.datasets.store import last_known
 from sainet.evaluation.intervals import (
     Estimate,
     Interval,
@@ -23,9 +24,9 @@ from sainet.evaluation.intervals import (
     wilson,
 )
 from sainet.evaluation.measurements import Condition, Measurements
-from sainet.evaluation.metrics import final_pose
 from sainet.models.correctors import CONFIDENCE, Region, interval_score
 from sainet.models.dynamics import AbstractDynamics
+from sainet.scenes.geometry import wrap_angle
 
 KINDS = ("pos", "rot")
 UNITS = {"pos": "mm", "rot": "deg"}
@@ -67,7 +68,7 @@ def of_parts(
         region = dynamics.region(batch.scene, batch.initial, batch.controls)
         if region is None:
             return {}
-        ends = final_pose(pose, seen), final_pose(true, seen)
+        ends = last_known(pose, seen), last_known(true, seen)
         for name, values in measured(region, *ends).items():
             found.setdefault(name, []).append(values)
     return found
@@ -86,7 +87,7 @@ def measured(
         true: final pose that was observed.
     """
     off = true - predicted
-    turn = np.mod(off[..., 2] + np.pi, 2 * np.pi) - np.pi
+    turn = wrap_angle(off[..., 2])
     axes = np.asarray(region.axes, np.float64)
     heading = np.asarray(region.heading, np.float64)[:, None]
     cosine, sine = np.cos(heading), np.sin(heading)

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Int
 from sainet.datasets.store import last_known
 from sainet.evaluation.intervals import Folds, Interval, Sample
 from sainet.runs.errors import Diverged
+from sainet.scenes.geometry import wrap_angle
 
 _AT_REST_MM = 1e-3  # mean travel below which a body is at rest
 REFERENCE_DISTANCE = {"simulated": 0.25, "recorded": 0.345}  # m, for trans (%)
@@ -140,7 +141,7 @@ def push_errors(
     offsets = Offsets(
         position_mm=1000 * np.linalg.norm(offset[..., :2], axis=-1),
         # An angle error is never more than half a turn.
-        rotation_deg=np.abs(np.rad2deg(_wrap(offset[..., 2]))),
+        rotation_deg=np.abs(np.rad2deg(wrap_angle(offset[..., 2]))),
         observed=observed,
     )
     return {name: measure(offsets) for name, measure in MEASURED.items()}
@@ -179,17 +180,6 @@ def check_finite(
         )
 
 
-def final_pose(
-    pose: Float[np.ndarray, "push time body 3"], observed: Bool[np.ndarray, "push time"]
-) -> Float[np.ndarray, "push body 3"]:
-    """Return the last observed pose of each push; NaN if none was observed."""
-    return last_known(pose, observed)
-
-
 def _times(values: Interval, factor: float) -> Interval:
     value, low, high = values
     return factor * value, factor * low, factor * high
-
-
-def _wrap(angle: np.ndarray) -> np.ndarray:
-    return np.mod(angle + np.pi, 2 * np.pi) - np.pi

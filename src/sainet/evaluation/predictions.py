@@ -10,11 +10,12 @@ from jaxtyping import Array, Float
 
 from sainet.datasets.batch import Prediction, PushBatch, to_batch
 from sainet.datasets.schema import input_names, published_name
-from sainet.datasets.store import Store
+from sainet.datasets.store import Store, last_known
 from sainet.engines.devices import over_devices
 from sainet.evaluation import metrics
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.model import Model
+from sainet.scenes.geometry import wrap_angle
 
 OnPushes = Callable[[str, int], None]  # called with a model and its new predictions
 # Pushes that are predicted at a time: one compilation for each length and size. Few are
@@ -59,7 +60,7 @@ class StoredPushes:
     @cached_property
     def final(self) -> Float[np.ndarray, "push body 3"]:
         """The last observed pose of each push."""
-        return self.in_order([metrics.final_pose(*truth) for truth in self.truths()])
+        return self.in_order([last_known(*truth) for truth in self.truths()])
 
     def errors(self, poses: Sequence[np.ndarray]) -> metrics.Errors:
         """Return the errors of the predicted poses of each part."""
@@ -154,7 +155,7 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
     arrays, truths = pushes.arrays, pushes.truths()
     poses = predict_all(model, pushes, lambda name, count: None)
     predicted = [
-        metrics.final_pose(p, seen) for p, (_, seen) in zip(poses, truths, strict=True)
+        last_known(p, seen) for p, (_, seen) in zip(poses, truths, strict=True)
     ]
     missed = (pushes.final - pushes.in_order(predicted))[:, 0]
     last = arrays["command_position"][np.arange(len(missed)), arrays["steps"] - 1]
@@ -163,5 +164,5 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
         place=arrays["initial"][:, 0, :2].astype(np.float64),
         heading=np.arctan2(stroke[:, 1], stroke[:, 0]),
         offset=missed[:, :2],
-        turn=np.mod(missed[:, 2] + np.pi, 2 * np.pi) - np.pi,
+        turn=wrap_angle(missed[:, 2]),
     )

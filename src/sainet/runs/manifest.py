@@ -41,7 +41,7 @@ def manifest(devices: int = 0) -> Manifest:
         devices: of JAX, where the result depends on their number.
     """
     return Manifest(
-        versions={name: _version(name) for name in _PACKAGES},
+        versions=_versions(),
         git_commit=_git_commit(),
         python=platform.python_version(),
         machine=platform.machine(),
@@ -62,8 +62,11 @@ def _gpu() -> str | msgspec.UnsetType:
 
 def code_versions() -> dict[str, str | None]:
     """Return what results may depend on: versions of packages, and the commit."""
-    found = {name: _version(name) for name in _PACKAGES}
-    return {**found, "git_commit": _git_commit()}
+    return {**_versions(), "git_commit": _git_commit()}
+
+
+def _versions() -> dict[str, str | None]:
+    return {name: _version(name) for name in _PACKAGES}
 
 
 def _version(name: str) -> str | None:

@@ -1,7 +1,12 @@
 """Angles and frames in the plane of the table."""
 
+from typing import TypeVar
+
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
+
+A = TypeVar("A", Array, np.ndarray)
 
 
 def unit(angle: Float[Array, "*batch"]) -> Float[Array, "*batch 2"]:
@@ -30,6 +35,6 @@ def norm(vector: Float[Array, "*batch 2"]) -> Float[Array, "*batch"]:
     return jnp.where(nonzero, jnp.sqrt(jnp.where(nonzero, squared, 1.0)), 0.0)
 
 
-def wrap_angle(angle: Float[Array, "*batch"]) -> Float[Array, "*batch"]:
+def wrap_angle(angle: A) -> A:
     """Return angles wrapped into [-pi, pi) (rad)."""
-    return jnp.mod(angle + jnp.pi, 2 * jnp.pi) - jnp.pi
+    return (angle + np.pi) % (2 * np.pi) - np.pi

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.schema import Arrays
-from sainet.datasets.store import Store
+from sainet.datasets.store import Store, last_known
 from sainet.evaluation import measurements, metrics
 from sainet.evaluation.claims import Claim, Verdict, compared, errs_less
 from sainet.evaluation.joining import add_models
@@ -79,7 +79,7 @@ def scatter(store: Store) -> measurements.Measurements:
     initial = arrays["initial"][..., :3].astype(np.float64)
     return measurements.measurements_of(
         {k: (v * share[:, None])[None, None] for k, v in errors.items()},
-        metrics.travel_mm(initial, metrics.final_pose(true, observed)),
+        metrics.travel_mm(initial, last_known(true, observed)),
         measurements.Header(
             models=(FLOOR,), reference_m=metrics.REFERENCE_DISTANCE["recorded"]
         ),

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from sainet.models.library import Model
 from sainet.planning.base import predicted_path
 from sainet.report.live.messages import BadMessage
+from sainet.scenes.geometry import wrap_angle
 from sainet.scenes.pushes import Push, PushGrid, place_pusher
 from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest
@@ -91,6 +92,6 @@ class Difference:
     ) -> "Difference":
         """Return the distance of each disk, and the angle between both poses."""
         offset = np.asarray(pose, np.float64) - other
-        turn = np.remainder(offset[:, 2] + np.pi, 2 * np.pi) - np.pi
+        deg = np.abs(np.rad2deg(wrap_angle(offset[:, 2])))
         mm = 1000 * np.linalg.norm(offset[:, :2], axis=1)
-        return cls(mm.round(3).tolist(), np.abs(np.rad2deg(turn)).round(3).tolist())
+        return cls(mm.round(3).tolist(), deg.round(3).tolist())
