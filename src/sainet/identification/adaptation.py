@@ -25,10 +25,10 @@ from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.simulator import UNIFORM_PRESSURE, Assumptions, PlanarSpec
 from sainet.models.dynamics import AbstractDynamics, PhysicsDynamics
 from sainet.models.model import Model
-from sainet.models.wrappers import OffsetCamera
+from sainet.models.wrappers import with_camera
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import PathControls
-from sainet.scenes.recording import Recording
+from sainet.scenes.recording import AGREES, Recording
 from sainet.scenes.scene import Scene, pair_gaps
 from sainet.scenes.state import State, at_rest
 
@@ -160,15 +160,8 @@ class Adaptation:
         if self._is_learned:
             return self.model.dynamics, scene
         engine = AssumedProperties(self.found.engine(self._given.ratio), _NOTHING)
-        return self._seen_by_camera(PhysicsDynamics(engine)), scene
-
-    def _seen_by_camera(self, dynamics: AbstractDynamics) -> AbstractDynamics:
-        own = self.model.dynamics
-        return (
-            OffsetCamera(dynamics, own.offset)
-            if isinstance(own, OffsetCamera)
-            else dynamics
-        )
+        camera = self.model.internal.camera if self.model.internal else AGREES
+        return with_camera(PhysicsDynamics(engine), camera), scene
 
     def _remembered(self) -> _Pushes:
         apart = _apart(self._given.scene.body_count)

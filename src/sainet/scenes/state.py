@@ -84,18 +84,8 @@ class Trajectory(eqx.Module):
     @property
     def final(self) -> State:
         """The state after the last step."""
-        return _at_step(self.states, -1)
-
-
-def _at_step(states: State, step: int) -> State:
-    return State(
-        position=states.position[..., step, :, :],
-        angle=states.angle[..., step, :],
-        velocity=states.velocity[..., step, :, :],
-        spin=states.spin[..., step, :],
-        pusher_position=states.pusher_position[..., step, :],
-        pusher_velocity=states.pusher_velocity[..., step, :],
-    )
+        batch = (slice(None),) * (self.states.angle.ndim - 2)
+        return jax.tree.map(lambda x: x[(*batch, -1)], self.states)
 
 
 def at_rest(position: Numbers, angle: Numbers, pusher_position: Numbers) -> State:

@@ -1,6 +1,7 @@
 """The planar engine: single steps and rollouts."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array, Float
@@ -43,7 +44,8 @@ class PlanarEngine(AbstractEngine):
 
         command = jnp.moveaxis(controls.command, -2, 0)
         _, states = lax.scan(advance, contact.to_bodies(initial), command)
-        return Trajectory(_time_after_batch(states, len(scene.batch_shape)))
+        time = len(scene.batch_shape)  # axis behind those of the batch
+        return Trajectory(jax.tree.map(lambda x: jnp.moveaxis(x, 0, time), states))
 
     def step(
         self,
@@ -127,20 +129,4 @@ def _integrate(
         velocity_x=vx,
         velocity_y=vy,
         spin=spin,
-    )
-
-
-def _time_after_batch(states: State, batch_axes: int) -> State:
-    """Return states with the time axis of a scan behind the batch axes."""
-    return State(*(jnp.moveaxis(part, 0, batch_axes) for part in _leaves(states)))
-
-
-def _leaves(states: State) -> tuple[Array, ...]:
-    return (
-        states.position,
-        states.angle,
-        states.velocity,
-        states.spin,
-        states.pusher_position,
-        states.pusher_velocity,
     )
