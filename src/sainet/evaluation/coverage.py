@@ -15,14 +15,7 @@ from jaxtyping import Float
 
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.store import last_known
-from sainet.evaluation.intervals import (
-    Estimate,
-    Interval,
-    Sample,
-    estimate,
-    folds_of,
-    wilson,
-)
+from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.models.correctors import CONFIDENCE, Region, interval_score
 from sainet.models.dynamics import AbstractDynamics
@@ -177,19 +170,6 @@ def _sentence(found: Coverage) -> str:
     )
 
 
-def _percent(inside: Sample) -> Interval:
-    """Return shares in percent: Wilson's interval, or that over folds and trainings.
-
-    A bootstrap of pushes that are all inside, or all outside, has no width.
-    """
-    share, *ends = inside.interval
-    is_plain = inside.folds is None and inside.values.ndim == 2  # noqa: PLR2004
-    takes_wilson = np.isfinite(ends[0]) & (is_plain | (share == 0) | (share == 1))
-    bounds = wilson(share, inside.values.shape[-2])
-    low, high = np.clip(np.where(takes_wilson, bounds, ends), 0, 1)
-    return 100 * share, 100 * low, 100 * high
-
-
 def _coverage(
     measured: Measurements, condition: Condition, slug: str, kind: str
 ) -> Sequence[Coverage]:
@@ -204,7 +184,7 @@ def _coverage(
     inside, size, score, plain = map(sample, (INSIDE, SIZE, SCORE, PLAIN))
     if not np.isfinite(inside.values).all() or not part.any():
         return []
-    intervals = (_percent(inside), size.interval, score.interval, score.over(plain))
+    intervals = (inside.percentage, size.interval, score.interval, score.over(plain))
     return [
         Coverage(
             condition=condition.label,

@@ -100,6 +100,19 @@ class Sample:
         """The means and the ends of their intervals."""
         return self._interval(self.mean, self.drawn())
 
+    @property
+    def percentage(self) -> Interval:
+        """Shares in percent: Wilson's interval, or that over folds and trainings.
+
+        A bootstrap of pushes that all count, or none of them, has no width.
+        """
+        share, *ends = self.interval
+        is_plain = self.folds is None and self.values.ndim == 2  # noqa: PLR2004
+        takes_wilson = np.isfinite(ends[0]) & (is_plain | (share == 0) | (share == 1))
+        bounds = wilson(share, self.values.shape[-2])
+        low, high = np.clip(np.where(takes_wilson, bounds, ends), 0, 1)
+        return 100 * share, 100 * low, 100 * high
+
     def minus(self, other: "Sample") -> Interval:
         """Return the differences of the means over the same pushes."""
         return self._interval(self.mean - other.mean, self.drawn() - other.drawn(1))

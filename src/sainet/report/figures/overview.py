@@ -185,8 +185,7 @@ def _ratios(part: Part) -> Iterator[Dot]:
     for each in factors:
         low, high = each.factor.low, each.factor.high
         if each.model not in hidden and low:
-            ratio = each.error / each.baseline
-            known = published.get(each.model)
+            ratio, known = each.error / each.baseline, published.get(each.model)
             yield Dot(styles[each.model], ratio, 1 / (high or np.inf), 1 / low, known)
 
 
