@@ -14,12 +14,12 @@ from sainet.control.trial import make_trial
 from sainet.control.trials import prepare
 from sainet.engines.base import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.engines.simulator import Assumptions
+from sainet.engines.simulator import Assumptions, InternalEngine
 from sainet.identification.adaptation import REMEMBERED, Adaptation, Properties
 from sainet.models.library import load_model
 from sainet.runs.errors import BadInput
 from sainet.scenes.pushes import Push, command_path
-from sainet.scenes.recording import Recording
+from sainet.scenes.recording import CameraOffset, Recording
 from sainet.scenes.scene import Scene
 
 STEPS = 120
@@ -128,6 +128,21 @@ def test_a_network_stays_as_it_is_and_is_given_other_properties():
     dynamics, _ = adaptation.adapted(TRUE.in_a_row())
     assert dynamics is adaptation.model.dynamics
     assert np.allclose(found.radius, TRUE.radius, rtol=0.03)
+
+
+def test_a_camera_offset_is_not_taken_for_other_properties():
+    camera = CameraOffset(x=0.002, y=-0.001)
+    model = load_model("physics-true")
+    internal = InternalEngine(model.internal.simulator, camera)
+    adaptation = Adaptation(replace(model, internal=internal), TRUE)
+    for push in PUSHES:
+        seen = recording_of(TRUE, *push)
+        pusher = seen.pusher - np.array(camera.vector)  # where the robot sees it
+        adaptation.add(replace(seen, pusher=pusher))
+    dynamics, found = adaptation.adapted(TRUE.in_a_row())
+    np.testing.assert_allclose(found.radius, TRUE.radius, rtol=2e-3)
+    np.testing.assert_allclose(found.disk_friction, TRUE.disk_friction, rtol=0.02)
+    assert dynamics.offset == camera
 
 
 def test_pushes_with_trouble_are_left_out():

@@ -28,7 +28,7 @@ from sainet.models.model import Model
 from sainet.models.wrappers import with_camera
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import PathControls
-from sainet.scenes.recording import AGREES, Recording
+from sainet.scenes.recording import AGREES, CameraOffset, Recording
 from sainet.scenes.scene import Scene, pair_gaps
 from sainet.scenes.state import State, at_rest
 
@@ -160,18 +160,24 @@ class Adaptation:
         if self._is_learned:
             return self.model.dynamics, scene
         engine = AssumedProperties(self.found.engine(self._given.ratio), _NOTHING)
-        camera = self.model.internal.camera if self.model.internal else AGREES
-        return with_camera(PhysicsDynamics(engine), camera), scene
+        return with_camera(PhysicsDynamics(engine), self._camera), scene
+
+    @property
+    def _camera(self) -> CameraOffset:
+        internal = self.model.internal
+        return internal.camera if internal else AGREES
 
     def _remembered(self) -> _Pushes:
+        """Return the pushes, all in the coordinates of the camera."""
+        offset = np.array(self._camera.vector)
         apart = _apart(self._given.scene.body_count)
         shape = (REMEMBERED, *apart.shape)
         start, end = np.broadcast_to(apart, (2, *shape)).copy()
         pusher, weight = np.full((REMEMBERED, 2), -1.0), np.zeros(REMEMBERED)
         path = np.full((REMEMBERED, SETTLED, 2), -1.0)
         for row, push in enumerate(self._pushes):
-            start[row], pusher[row] = push.initial, push.initial_pusher
-            path[row] = _first_steps(push.pusher)
+            start[row], pusher[row] = push.initial, push.initial_pusher + offset
+            path[row] = _first_steps(push.pusher) + offset
             end[row], weight[row] = _end(push), 1.0
         arrays = (start, pusher, path, end, weight)
         return _Pushes(*(jnp.asarray(each, jnp.float32) for each in arrays))
