@@ -153,6 +153,39 @@ def test_controls_predict_as_the_push_that_they_are_of(model):
     np.testing.assert_allclose(one, other, atol=1e-6)
 
 
+@pytest.mark.parametrize("shared", ["scene", "scene and state", "controls"])
+def test_controls_have_the_leading_axes_of_all_parts(model, shared):
+    rows = lambda part: jax.tree.map(lambda x: jnp.stack([x] * 3), part)  # noqa: E731
+    scene, state, push = rows(SCENE), rows(SCENE.in_a_row()), sn.Push(ANGLES)
+    if shared == "controls":
+        push = sn.Push(jnp.full(3, 0.2))
+    initial, controls = command_path(scene, state, push, steps=40)
+    wanted = model.predict(scene, initial, controls)
+    one = lambda part: jax.tree.map(lambda x: x[0], part)  # noqa: E731
+    given = {
+        "scene": (SCENE, initial, controls),
+        "scene and state": (SCENE, one(initial), controls),
+        "controls": (scene, initial, one(controls)),
+    }[shared]
+    if shared == "scene and state":  # the pusher of the first push
+        wanted = model.predict(scene, rows(one(initial)), controls)
+    found = model.predict(*given)
+    for x, y in zip(jax.tree.leaves(found), jax.tree.leaves(wanted), strict=True):
+        np.testing.assert_allclose(x, y, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "push",
+    [
+        *(sn.Push(np.pi), sn.Push(0, direction=-np.pi / 2), sn.Push(0, length=1e-4)),
+        sn.Push(0, length=1e-4, speed=1e-4),
+    ],
+)
+def test_single_precision_numbers_at_a_bound_are_in_the_range(push):
+    moved = sn.load("physics").predict(SCENE, SCENE.in_a_row(), push, steps=2)
+    assert jnp.isfinite(moved.final.position).all()
+
+
 def test_a_slow_or_long_push_is_predicted_until_its_end():
     physics = sn.load("physics-true")
     slow = sn.Push(contact_angle=0.0, speed=0.025)

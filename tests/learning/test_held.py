@@ -16,7 +16,7 @@ from sainet.learning.batches import predict_batch
 from sainet.learning.loss import feature_scales
 from sainet.learning.recipes import PAPER
 from sainet.models.correctors import Start
-from sainet.models.correctors.held import unroll_held
+from sainet.models.correctors.held import _mean, unroll_held
 from sainet.models.inputs import push_frame
 from sainet.models.integrators import RelaxingResidual
 from sainet.runs.errors import BadInput
@@ -70,6 +70,13 @@ def test_a_constant_network_may_be_held(residual, hold):
     made, batch = constant(residual), batch_of()
     found = predicted(made, batch, hold)
     np.testing.assert_allclose(found, predicted(made, batch, 1), atol=2e-6)
+
+
+def test_the_last_block_is_the_mean_of_the_steps_that_it_has():
+    steps = np.random.default_rng(0).normal(size=(2, 11, 1, 3))
+    found = _mean(jnp.asarray(steps, jnp.float32), 4)
+    wanted = [steps[:, at : at + 4].mean(axis=1) for at in (0, 4, 8)]
+    np.testing.assert_allclose(found, np.stack(wanted, axis=1), rtol=1e-5)
 
 
 def test_a_shorter_hold_is_more_accurate(residual):

@@ -12,6 +12,7 @@ from sainet.evaluation.unlike import doubts_of_count
 from sainet.learning import fit as fit_module
 from sainet.learning.fit import fit
 from sainet.learning.job import STATE
+from sainet.learning.loss import CONSTANT
 from sainet.learning.mixture import Batches, Mixture, pool
 from sainet.learning.recipes import CONTACT, PAPER, FromModel
 from sainet.learning.task import Task
@@ -113,6 +114,22 @@ def test_pooled_statistics_are_those_of_all_numbers():
     np.testing.assert_allclose(found.acceleration, 12.5**0.5, rtol=1e-6)
     without_pairs = pool([scales(parts[0], 3.0), scales(parts[1], 4.0)], [1, 3])
     np.testing.assert_allclose(without_pairs.pair_mean, parts[1].mean(0), rtol=1e-5)
+
+
+def test_what_varies_in_no_dataset_does_not_widen_what_varies_between_them():
+    def scales(mean, deviation, size):
+        body, pair = jnp.array([mean, 2.0]), jnp.array([0.0])
+        return Scales(
+            *(pair, jnp.ones(1), body, jnp.array([deviation, CONSTANT])),
+            jnp.array([size, size, CONSTANT]),
+        )
+
+    constant = [scales(0.05, CONSTANT, CONSTANT), scales(0.06, CONSTANT, 0.05)]
+    found = pool(constant, [2, 3])
+    np.testing.assert_allclose(found.body_deviation, [0.005, CONSTANT], rtol=1e-5)
+    np.testing.assert_allclose(found.acceleration, [0.05, 0.05, CONSTANT], rtol=1e-5)
+    varied = pool([scales(0.05, CONSTANT, 1e-3), scales(0.05, 0.004, 1e-3)], [2, 3])
+    np.testing.assert_allclose(varied.body_deviation[0], 0.004 / 2**0.5, rtol=1e-4)
 
 
 def test_datasets_that_do_not_belong_together_are_refused(stores, tmp_path):

@@ -311,6 +311,16 @@ def test_regions_are_alike_where_errors_are():
     assert widest > 0
 
 
+def test_residuals_of_zero_have_regions_of_no_size():
+    ends = scattered(30, 0, loud=1.0)
+    exact = replace(ends, rates=0 * ends.rates)
+    fit = calibrated_fit(exact, ProcessSettings(iterations=4))
+    fitted = fit.fitted
+    assert fit.missed == 0
+    assert (fitted.reach == 0).all()
+    assert np.isfinite(fitted.near).all()
+
+
 def test_where_no_push_is_near_the_mean_error_is_expected():
     errors = np.array([1.0, 2.0, 6.0])
     assert error_near(errors, np.zeros((3, 1))) == 3.0

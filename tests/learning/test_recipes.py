@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import asdict
 
 from sainet.learning.recipes import (
+    CONTACT,
     FINE_TUNING,
     PAPER,
     RESIDUAL,
@@ -18,7 +19,8 @@ from sainet.learning.recipes import (
     start_named,
 )
 from sainet.models.card import TrainingSettings
-from sainet.runs.errors import BadSetting, UnknownName
+from sainet.runs.documents import checked
+from sainet.runs.errors import BadInput, BadSetting, UnknownName
 
 AT_LEAST_ONE = ("iterations", "batch_size", "halve_every", "steps", "hold")
 AT_LEAST_ONE += ("log_every", "checkpoint_every")
@@ -91,3 +93,14 @@ def test_a_start_from_a_model_or_the_simulator_is_no_name():
     assert start_named("sain") == FromModel("sain")
     assert start_named("engine") == FromSimulator()
     assert "sain" not in asdict(FINE_TUNING.settings()).values()
+
+
+def test_unknown_terms_of_the_loss_are_refused():
+    with pytest.raises(BadInput, match="terms"):
+        checked(msgspec.structs.replace(PAPER.settings(), terms="errors"), "recipe")
+
+
+def test_a_contact_network_keeps_its_hold_when_it_is_tuned_further():
+    start = FromModel("sain-any")
+    assert recipe_for(start, "contact").horizon.hold == CONTACT.horizon.hold
+    assert recipe_for(start).horizon.hold == 1

@@ -41,8 +41,9 @@ class Changes:
     then do not dominate. 0: squared everywhere."""
     steps: int = RESIDUAL.horizon.steps
     """Steps of each push to train on, at most."""
-    hold: int = RESIDUAL.horizon.hold
-    """Zero-order-hold length for additive networks in training (steps)."""
+    hold: int | None = None
+    """Zero-order-hold length for additive networks in training (steps; default: 8 from
+    the engine and with the features 'contact', 1 from a network)."""
     mirror: bool = RESIDUAL.augmentation.mirror
     """Do not mirror pushes. By default, about half of each batch is mirrored (not with
     the features 'place')."""

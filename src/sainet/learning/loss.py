@@ -122,6 +122,7 @@ Weights = Callable[[Moment], Array | None]
 
 # A deviation below this, or this share of the mean, is rounding: nothing varies.
 _CONSTANT, _CONSTANT_SHARE = 1e-9, 1e-4
+CONSTANT = 1.0  # stands for the deviation of a feature that never varies
 _STILL = 1e-14  # a mean square (m^2) or acceleration (m/s^2) below this is rounding
 
 
@@ -193,7 +194,7 @@ def _spread(
         deviation = jnp.sqrt(jnp.sum(spread * shares[None], axis=1))
     # A feature that never varies must not be divided by rounding errors.
     varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
-    return mean, jnp.where(varies, deviation, 1.0)
+    return mean, jnp.where(varies, deviation, CONSTANT)
 
 
 @eqx.filter_jit
@@ -278,7 +279,7 @@ def _correction(batch: PushBatch, integrator: RelaxingResidual) -> Array:
 
 def _nonzero(size: Array) -> Array:
     """Return a size, or 1 where it is zero, for example of a disk that never turns."""
-    return jnp.where(size > _STILL, size, 1.0)
+    return jnp.where(size > _STILL, size, CONSTANT)
 
 
 def _known_motion(batch: PushBatch) -> Array:

@@ -15,7 +15,7 @@ from jaxtyping import UInt64
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.store import Store
 from sainet.learning.checks import check_apart, check_task
-from sainet.learning.loss import LossWeights
+from sainet.learning.loss import CONSTANT, LossWeights
 from sainet.learning.sources import source_of
 from sainet.learning.step import FitState, data_loss, even_batch, first_state
 from sainet.learning.task import Task, first_network, settings, statistics
@@ -141,14 +141,18 @@ def pool(scales: Sequence[Scales], bodies: Sequence[int]) -> Scales:
     body = _pooled([(each.body_mean, each.body_deviation) for each in scales])
     pair = _pooled([(s.pair_mean, s.pair_deviation) for s in paired or scales])
     sizes = jnp.stack([each.acceleration for each in scales])
-    return Scales(*pair, *body, jnp.sqrt(jnp.mean(sizes**2, axis=0)))
+    known = jnp.where(sizes == CONSTANT, jnp.nan, sizes**2)
+    size = jnp.nan_to_num(jnp.sqrt(jnp.nanmean(known, axis=0)), nan=CONSTANT)
+    return Scales(*pair, *body, size)
 
 
 def _pooled(each: Sequence[tuple[jax.Array, jax.Array]]) -> tuple[jax.Array, jax.Array]:
     means, deviations = (jnp.stack(x) for x in zip(*each, strict=True))
     mean = jnp.mean(means, axis=0)
-    within = jnp.mean(deviations**2 + (means - mean[None]) ** 2, axis=0)
-    return mean, jnp.sqrt(within)
+    varies = deviations != CONSTANT
+    within = jnp.where(varies, deviations, 0.0) ** 2 + (means - mean[None]) ** 2
+    size = jnp.sqrt(jnp.mean(within, axis=0))
+    return mean, jnp.where(varies.any(axis=0) | (size > 0), size, CONSTANT)
 
 
 class Batches:

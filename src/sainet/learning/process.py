@@ -38,7 +38,7 @@ from sainet.runs.manifest import MANIFEST, Manifest
 Identify = Callable[[Path], InternalEngine]
 # Widths of neighbourhoods, in length scales; in the last one all pushes count alike.
 _NEAR = (0.35, 0.5, 0.7, 1.0, 1.5, 1e6)
-_TINY = 1e-30  # less than any sum of squared predictions but zero
+_TINY = 1e-30  # less than any size or sum of squares but zero
 ENGINE = "engine"  # folder, inside the run folder, of the engine identified for it
 _log = logging.getLogger(__name__)
 
@@ -77,6 +77,7 @@ def fit_process(
     if callable(internal):
         internal = internal(out / ENGINE)
     ends = ends_of(store, internal, settings.features)
+    _check_kinds(store.path, ends.kinds, settings.folds)
     best = _best_fit(ends, settings, on_output)
     with jax.enable_x64(True):
         data = save_arrays(out / ARRAYS, best.fitted)
@@ -126,13 +127,17 @@ def check_store(store: Store, settings: ProcessSettings) -> None:
             f"{path}: {info.pushes} pushes; a Gaussian process takes at most {MOST}, "
             "choose some with `pushes`."
         )
-    kinds = len(np.unique(store.repeats()))
-    if kinds < settings.folds:
-        raise BadStore(
-            f"{path}: {kinds} pushes that are not repeats of each other; the "
-            f"calibration needs at least {settings.folds}."
-        )
+    _check_kinds(path, store.repeats(), settings.folds)
     check_inputs(store, settings.features)
+
+
+def _check_kinds(path: Path, kinds: Int[np.ndarray, " push"], folds: int) -> None:
+    found = len(np.unique(kinds))
+    if found < folds:
+        raise BadStore(
+            f"{path}: {found} pushes that are not repeats of each other and have known "
+            f"ends; the calibration needs at least {folds}."
+        )
 
 
 class _Fit(NamedTuple):
@@ -188,7 +193,7 @@ def calibrated_fit(
         reach=reach,
         plain=quantile(missed),
     )
-    left = missed.mean(axis=0) / sizes_of(ends.rates).mean(axis=0)
+    left = missed.mean(axis=0) / np.maximum(sizes_of(ends.rates).mean(axis=0), _TINY)
     return _Fit(settings, ends.names, calibrated, loss, float(left.mean()))
 
 
@@ -253,7 +258,7 @@ def _neighbourhoods(
         for length in np.multiply.outer(_NEAR, lengths[place]):
             points = fitted.inputs / length
             close = correlation_between(fitted.kernel, points, points)
-            expected = error_near(found, close * apart)
+            expected = np.maximum(error_near(found, close * apart), _TINY)
             (factor,) = quantile((found / expected)[:, None])
             score = interval_score(factor * expected * size, found * size).mean()
             if score < best:

@@ -6,14 +6,13 @@ Free of JAX.
 
 import math
 from dataclasses import asdict, dataclass, fields, is_dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
-from sainet.models.card import Decay, TrainingSettings
+from sainet.models.card import Decay, Terms, TrainingSettings
 from sainet.models.identity import Features
 from sainet.runs.documents import checked
 from sainet.runs.errors import require, unknown_name
 
-Terms = Literal["motion", "error", "metres"]
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
 
 
@@ -103,7 +102,7 @@ class WholePush:
     """Steps of each push to train on."""
     hold: int = 1
     """Zero-order-hold length for additive networks (steps): training computes their
-    output once and reuses it. Predictions never hold it."""
+    output once and reuses it. Predictions hold only that of contact networks."""
     short_iterations: int = 0
     """Number of first iterations in which pushes end after a quarter of the steps."""
 
@@ -293,8 +292,11 @@ def recipe_for(start: Start, features: str | None = None) -> Recipe:
 
     Args:
         start: random weights, a network, or the internal engine.
-        features: of the network; `contact` has a recipe of its own from the engine.
+        features: of the network; `contact` has a recipe of its own from the engine, and
+            its hold from a network.
     """
-    if features == "contact" and isinstance(start, FromSimulator):
-        return CONTACT
-    return replace(RECIPES[type(start)], start=start)
+    recipe = replace(RECIPES[type(start)], start=start)
+    if features != "contact" or isinstance(start, Fresh):
+        return recipe
+    is_new = isinstance(start, FromSimulator)
+    return CONTACT if is_new else recipe.changed(hold=CONTACT.horizon.hold)

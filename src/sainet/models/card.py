@@ -19,6 +19,7 @@ CARD = "card.json"
 WEIGHTS = "network.safetensors"
 IDENTIFIED = "identified.json"
 Decay = Literal["halving", "cosine"]  # of the learning rate
+Terms = Literal["motion", "error", "metres"]
 Count = Annotated[int, msgspec.Meta(ge=1)]
 
 
@@ -41,7 +42,7 @@ class TrainingSettings(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=
     weight_rotation: float
     weight_velocity: float
     weight_spin: float
-    terms: str
+    terms: Terms
     linear_from: float
     horizon: Literal["whole-push", "single-steps"]
     steps: int

@@ -23,6 +23,7 @@ from sainet.models.push_inputs import (
     predict_push,
     steps_of,
     untrained,
+    widened,
 )
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene
@@ -133,10 +134,10 @@ class Model:
                 "of pushes."
             )
         check_purpose(self.dynamics, kind_of(push), scene.time_step, scene.body_count)
-        if not isinstance(push, Push):
-            return predict(self.dynamics, scene, state, push)
-        steps = steps_of(push, scene.time_step) if steps is None else steps
         check_axes(scene, state, push)
+        if not isinstance(push, Push):
+            return predict(self.dynamics, *widened(scene, state, push))
+        steps = steps_of(push, scene.time_step) if steps is None else steps
         if scene.body_count > 1 and not is_traced(push):
             self._warn_of_untrained(push)
         run = predict_push if self.dynamics.on_host else compiled

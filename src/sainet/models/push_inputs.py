@@ -75,7 +75,7 @@ def kind_of(push: Push | Controls) -> str:
     return PathControls.kind if isinstance(push, Push) else push.kind
 
 
-def check_axes(scene: Scene, state: State, push: Push) -> None:
+def check_axes(scene: Scene, state: State, push: Push | Controls) -> None:
     """Raise `BadScene` unless scene, state and push have equal or no leading axes."""
     names = ", ".join(map(str, _axes(scene, state, push)))
     if max(map(len, _axes(scene, state, push))) > 1:
@@ -92,24 +92,33 @@ def check_axes(scene: Scene, state: State, push: Push) -> None:
         ) from None
 
 
-def _axes(scene: Scene, state: State, push: Push) -> tuple[tuple[int, ...], ...]:
-    return scene.batch_shape, state.angle.shape[:-1], push.speed.shape
+def _axes(
+    scene: Scene, state: State, push: Push | Controls
+) -> tuple[tuple[int, ...], ...]:
+    own = push.speed.shape if isinstance(push, Push) else push.command.shape[:-2]
+    return scene.batch_shape, state.angle.shape[:-1], own
+
+
+def widened(scene: Scene, state: State, push: Push | Controls) -> tuple[Any, ...]:
+    """Return the three, each with the leading axes of all."""
+    own = _axes(scene, state, push)
+    shape = np.broadcast_shapes(*own)
+
+    def widen(part: Any, axes: int) -> Any:  # noqa: ANN401
+        return jax.tree.map(lambda x: jnp.broadcast_to(x, shape + x.shape[axes:]), part)
+
+    return tuple(map(widen, (scene, state, push), map(len, own)))
 
 
 def predict_push(
     dynamics: AbstractDynamics, scene: Scene, state: State, push: Push, steps: int
 ) -> Trajectory:
     """Return the predicted motion of pushes, with the leading axes of all parts."""
-    own = _axes(scene, state, push)
-    shape = np.broadcast_shapes(*own)
-
-    def widened(part: Any, axes: int) -> Any:  # noqa: ANN401
-        return jax.tree.map(lambda x: jnp.broadcast_to(x, shape + x.shape[axes:]), part)
-
-    parts = zip((scene, state, push), map(len, own), strict=True)
-    scene, state, push = (widened(*part) for part in parts)
+    scene, state, push = widened(scene, state, push)
     initial, controls = command_path(scene, state, push, steps=steps)
-    if 0 in shape:  # networks reshape, which an axis of no pushes does not allow
+    if (
+        0 in scene.batch_shape
+    ):  # networks reshape, which an axis of no pushes does not allow
         return Trajectory(
             jax.tree.map(lambda x: jnp.zeros((0, steps, *x.shape[1:])), initial)
         )

@@ -14,6 +14,8 @@ import numpy as np
 
 from sainet.runs.errors import BadInput, BadSetting
 
+_SLACK = 1e-6  # relative, of a bound: single precision rounds
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -82,7 +84,8 @@ class Quantity:
 
     def _first_outside(self, values: object) -> float | None:
         numbers = np.asarray(values, np.float64)
-        bad = ~((numbers >= self.low) & (numbers <= self.high))  # NaN as well
+        low, high = self.low - _SLACK * abs(self.low), self.high + _SLACK * self.high
+        bad = ~((numbers >= low) & (numbers <= high))  # NaN as well
         return float(numbers[bad].flat[0]) if bad.any() else None
 
 

@@ -108,11 +108,12 @@ def _steps(drive: Drive) -> tuple[Array, Array]:
 def _mean(
     step: Float[Array, "push time body 3"], hold: int
 ) -> Float[Array, "push block body 3"]:
-    """Return means over so many steps; beyond its end a push stands still."""
-    missing = -step.shape[1] % hold
+    """Return means over so many steps, the last one over those that are left."""
+    steps, missing = step.shape[1], -step.shape[1] % hold
     step = jnp.pad(step, [(0, 0), (0, missing), (0, 0), (0, 0)])
     blocks = step.reshape(step.shape[0], -1, hold, *step.shape[2:])
-    return jnp.mean(blocks, axis=2)
+    each = np.minimum(hold, steps - hold * np.arange(blocks.shape[1]))
+    return jnp.sum(blocks, axis=2) / jnp.asarray(each)[None, :, None, None]
 
 
 def _time_first(tree: Any) -> Any:  # noqa: ANN401

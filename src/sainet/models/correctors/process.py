@@ -5,10 +5,12 @@ process of the start of the push: a kernel with one length scale for each input,
 It grows in proportion to the travel of the pusher, and has a value at every step.
 """
 
+from functools import partial
 from typing import cast
 
 import equinox as eqx
 import jax.numpy as jnp
+from jax import lax
 from jaxtyping import Array, Float
 
 from sainet.models.correctors import (
@@ -28,6 +30,8 @@ BODIES = 2  # at most
 RESIDUALS = 3  # of a body: along the push (m), across it (m), angle (rad)
 _SMALLEST = 1e-6  # m, a shorter travel of the pusher has no direction
 _SAME = 1e-12  # squared distance of points that are one
+# GPUs would round the factors to ten bits, and differences here are small.
+_dot = partial(jnp.matmul, precision=lax.Precision.HIGHEST)
 
 
 class Inputs(eqx.Module):
@@ -116,9 +120,9 @@ class Process(eqx.Module):
             variance, length = self.amplitude[output] ** 2, self.length[output, None]
             near = correlation(self.kernel, self.inputs / length, inputs / length)
             across = variance * near
-            known = jnp.sum((self.whitening[output] @ across) ** 2, axis=0)
+            known = jnp.sum(_dot(self.whitening[output], across) ** 2, axis=0)
             left = variance - known
-            means.append(self.weights[output] @ across)
+            means.append(_dot(self.weights[output], across))
             deviations.append(jnp.sqrt(jnp.maximum(left, 0.0) + self.noise[output]))
         mean, deviation = jnp.stack(means, -1), jnp.stack(deviations, -1)
         return self.mean[None] + self.scale[None] * mean, self.scale[None] * deviation
@@ -136,7 +140,7 @@ def correlation(
     """
     sizes = jnp.sum(one**2, axis=1)[:, None] + jnp.sum(other**2, axis=1)[None]
     factor, of = KERNELS[kernel]
-    squares = factor * (sizes - 2 * one @ other.T)
+    squares = factor * (sizes - 2 * _dot(one, other.T))
     differ = squares > _SAME  # the root has no slope at zero
     far = jnp.where(differ, jnp.sqrt(jnp.where(differ, squares, 1.0)), 0.0)
     return of(far, jnp.exp)[0]
