@@ -69,6 +69,13 @@ def test_two_advances_equal_a_long_advance():
     np.testing.assert_allclose(found, pack_motion(whole.states), atol=2e-5)
 
 
+def test_the_engine_alone_has_the_camera_too():
+    model = model_of("sain", "robot")
+    alone = with_camera(model, OFFSET).engine_alone
+    assert eqx.tree_equal(alone, OffsetCamera(PhysicsDynamics(model.engine), OFFSET))
+    assert with_camera(model_of("physics", "robot"), OFFSET).engine_alone is None
+
+
 def test_a_zero_camera_offset_adds_no_wrapper():
     model = model_of("in", "robot")
     assert with_camera(model, CameraOffset()) is model

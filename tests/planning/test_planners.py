@@ -24,11 +24,10 @@ from sainet.planning.levels import (
     judge,
     predicted_ends,
     roll_pushes,
-    settled_steps,
 )
 from sainet.planning.tree import TreePlanner
 from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
-from sainet.scenes.pushes import PushGrid
+from sainet.scenes.pushes import PushGrid, settled_steps
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import at_rest
 from sainet.tasks.push_to_goal import PushToGoal
@@ -174,7 +173,7 @@ def test_an_empty_queue_ends_with_the_best_sequence():
 
 
 def test_a_deadline_ends_with_the_best_sequence():
-    hasty = TreePlanner(actions=FEW, deadline=1e-9, block=2)
+    hasty = TreePlanner(actions=FEW, deadline=0.0, block=2)
     plan = hasty.plan(PHYSICS, FAR, SCENE, STATE)
     assert not plan.is_complete
     assert (len(plan.pushes), plan.evaluated) == (1, 6)
@@ -217,6 +216,13 @@ def test_outcomes_are_those_of_single_predictions():
     assert not found.state.velocity.any()
 
 
+def test_blocks_contain_every_first_push_once():
+    order = np.random.default_rng(0).permutation(25)
+    blocks = TreePlanner(block=12)._blocks(order)
+    assert [len(block) for block in blocks] == [12, 12, 1]
+    np.testing.assert_array_equal(np.concatenate(blocks), order)
+
+
 @pytest.mark.parametrize(
     ("length", "speed", "time_step"),
     [(0.01, 0.05, 1 / 240), (0.01, 0.02, 1 / 240), (0.03, 0.05, 1 / 240)]
@@ -232,11 +238,11 @@ def test_pushes_are_predicted_until_everything_rests(length, speed, time_step):
     path = load_model("physics-true").predict(slow, STATE, one).final
     np.testing.assert_allclose(found.position[0], path.position, atol=2e-6)
     plan = GreedyPlanner(actions=grid).plan(PHYSICS, FAR, slow, STATE)
-    assert len(plan.path) % settled_steps(push, slow) == 0
+    assert len(plan.path) % settled_steps(push, time_step) == 0
 
 
 def test_the_papers_pushes_take_48_steps_and_32_to_rest():
-    assert settled_steps(PushGrid().pushes(), SCENE) == 80
+    assert settled_steps(PushGrid().pushes(), SCENE.time_step) == 80
 
 
 def moved():

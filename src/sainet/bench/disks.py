@@ -11,8 +11,8 @@ from sainet.control.config import ControlConfig
 from sainet.control.trial import make_trial
 from sainet.models.library import load_model
 from sainet.planning import make_planner
-from sainet.planning.levels import judge, settled_steps
-from sainet.scenes.pushes import PushGrid
+from sainet.planning.levels import judge
+from sainet.scenes.pushes import PushGrid, settled_steps
 
 COUNTS = (2, 4, 8, 16)
 _STATES = 18  # from each of which every candidate push is predicted
@@ -42,7 +42,7 @@ def _figures(count: int, runs: int) -> Figures:
     trial = make_trial(ControlConfig(disks=count), 0)
     one = trial.robot.observe()
     pushes = jax.tree.map(lambda x: np.tile(x, _STATES), PushGrid().pushes())
-    rows, steps = len(pushes.length), settled_steps(pushes, trial.scene)
+    rows, steps = len(pushes.length), settled_steps(pushes, trial.scene.time_step)
     states = jax.tree.map(lambda x: np.repeat(np.asarray(x)[None], rows, 0), one)
     found: dict[str, float] = {}
     for name, model in _MODELS.items():

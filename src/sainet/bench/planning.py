@@ -20,8 +20,8 @@ from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.library import load_model
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning.base import Plan
-from sainet.planning.levels import batch_of, roll_pushes, settled_steps
-from sainet.scenes.pushes import PushGrid
+from sainet.planning.levels import batch_of, roll_pushes
+from sainet.scenes.pushes import PushGrid, settled_steps
 
 DECISIONS = 50
 _ROUNDS = 5  # in each, decisions alternate with pushes in Bullet
@@ -105,7 +105,7 @@ def _bullet_pushes() -> list[float]:
     for index in range(_PUSHES):
         push = jax.tree.map(lambda x, i=index: x[i][None], PushGrid().pushes())
         start = perf_counter()
-        steps = settled_steps(push, scene)
+        steps = settled_steps(push, scene.time_step)
         jax.block_until_ready(roll_pushes(physics, scene, state, push, steps).states)
         times.append(perf_counter() - start)
     return times

@@ -39,7 +39,7 @@ class AbstractDynamics(eqx.Module):
         return False
 
     @property
-    def engine_alone(self) -> "PhysicsDynamics | None":
+    def engine_alone(self) -> "AbstractDynamics | None":
         """Its engine without a corrector; None if it has none, or one on the host.
 
         Planners screen sequences of pushes with it.

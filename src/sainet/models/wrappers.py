@@ -40,6 +40,12 @@ class OffsetCamera(AbstractDynamics):
         """Whether the wrapped model states regions."""
         return self.dynamics.has_regions
 
+    @property
+    def engine_alone(self) -> AbstractDynamics | None:
+        """The engine inside the wrapped model, with the same camera."""
+        alone = self.dynamics.engine_alone
+        return alone and OffsetCamera(alone, self.offset)
+
     def begin(self, scene: Scene, state: State) -> Carry:
         """Return the carry of the wrapped model at the state."""
         return self.dynamics.begin(scene, state.with_pusher_moved(self._offset))

@@ -20,10 +20,9 @@ from sainet.planning.levels import (
     batch_of,
     predicted_ends,
     roll_pushes,
-    settled_steps,
 )
 from sainet.scenes.controls import PathControls
-from sainet.scenes.pushes import Push, PushGrid
+from sainet.scenes.pushes import Push, PushGrid, settled_steps
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
 from sainet.tasks.push_to_goal import AbstractTask
@@ -115,7 +114,8 @@ def predicted_path(
     state = jax.tree.map(_batch_of_one, state)
     poses = []
     for push in pushes:
-        steps, one = settled_steps(push, scene), jax.tree.map(_batch_of_one, push)
+        steps = settled_steps(push, scene.time_step)
+        one = jax.tree.map(_batch_of_one, push)
         pose, state = roll(dynamics, scene, state, one, steps)
         poses.append(np.asarray(pose)[0])
     return np.concatenate(poses)

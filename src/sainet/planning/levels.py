@@ -1,6 +1,5 @@
 """Outcomes of sequences of pushes, and the levels that a search selects from."""
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,15 +14,22 @@ from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
 from sainet.planning.expectation import mean_over
 from sainet.runs.errors import Diverged
-from sainet.scenes.pushes import Push, PushGrid, command_path, place_pusher
+from sainet.scenes.pushes import (
+    Push,
+    PushGrid,
+    command_path,
+    place_pusher,
+    settled_steps,
+)
 from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, Trajectory, at_rest
 from sainet.tasks.push_to_goal import AbstractTask
 
-_RESTED = 32 / 240  # s, until everything rests after a push
 _NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
 AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
 _Result = TypeVar("_Result")
+# What all pushes of a call share; each is predicted for so many steps.
+Shared = tuple[AbstractDynamics, AbstractTask, Scene, int]
 
 
 class Outcomes(NamedTuple):
@@ -60,7 +66,7 @@ def judge(
     Returns:
         The outcomes, ``[push]``, as NumPy arrays.
     """
-    shared = dynamics, task, scene, settled_steps(pushes, scene)
+    shared = dynamics, task, scene, settled_steps(pushes, scene.time_step)
     function = _judge_expected if expected else _judge
     return _of_pushes(function, shared, states, pushes, AT_ONCE)
 
@@ -69,17 +75,8 @@ def predicted_ends(
     dynamics: AbstractDynamics, scene: Scene, states: State, pushes: Push
 ) -> State:
     """Return where one push from each state of one scene ends, ``[push]``, at rest."""
-    shared = dynamics, scene, settled_steps(pushes, scene)
+    shared = dynamics, scene, settled_steps(pushes, scene.time_step)
     return _of_pushes(_ends, shared, states, pushes)
-
-
-def settled_steps(pushes: Push, scene: Scene) -> int:
-    """Return the steps until every push has ended and everything rests."""
-    moving = float(np.max(np.asarray(pushes.length) / np.asarray(pushes.speed)))
-    rounding = 1e-3
-    return math.ceil(moving / scene.time_step - rounding) + round(
-        _RESTED / scene.time_step
-    )
 
 
 def _of_pushes(
@@ -119,11 +116,7 @@ def batch_of(scene: Scene, count: int) -> Scene:
     return jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *x.shape)), scene)
 
 
-def _judge(
-    shared: tuple[AbstractDynamics, AbstractTask, Scene, int],
-    states: State,
-    pushes: Push,
-) -> Outcomes:
+def _judge(shared: Shared, states: State, pushes: Push) -> Outcomes:
     dynamics, task, scene, steps = shared
     scenes = batch_of(scene, states.angle.shape[0])
     ends = ends_of(dynamics, scenes, states, pushes, steps)
@@ -149,11 +142,7 @@ def outcomes_of(
     return Outcomes(ends, cost, task.distance(ends), solved)
 
 
-def _judge_expected(
-    shared: tuple[AbstractDynamics, AbstractTask, Scene, int],
-    states: State,
-    pushes: Push,
-) -> Outcomes:
+def _judge_expected(shared: Shared, states: State, pushes: Push) -> Outcomes:
     """Return the outcomes with the cost and the distance that are expected."""
     dynamics, task, scene, steps = shared
     found = _judge(shared, states, pushes)
@@ -198,7 +187,7 @@ class Problem:
     @cached_property
     def steps(self) -> int:
         """How many steps each push is predicted for."""
-        return settled_steps(self.pushes, self.scene)
+        return settled_steps(self.pushes, self.scene.time_step)
 
     @property
     def is_near(self) -> bool:

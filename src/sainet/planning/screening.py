@@ -20,6 +20,7 @@ from sainet.planning.levels import (
     AT_ONCE,
     Level,
     Problem,
+    Shared,
     batch_of,
     ends_of,
     outcomes_of,
@@ -28,7 +29,6 @@ from sainet.scenes.geometry import rotate
 from sainet.scenes.pushes import Push, push_axis
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
-from sainet.tasks.push_to_goal import AbstractTask
 
 SHARE = 12  # of so many sequences the model predicts one
 FEWEST = 72  # sequences that the model predicts in any case
@@ -105,7 +105,7 @@ def _residual_of(
 
 
 def _corrected_cost(
-    shared: tuple[AbstractDynamics, AbstractTask, Scene, int],
+    shared: Shared,
     states: State,
     pushes: Push,
     added: Residual,

@@ -50,12 +50,11 @@ class TreePlanner(AbstractPlanner):
 
     def _clock(self) -> Callable[[], bool]:
         """Return a function that returns whether the deadline has passed."""
-        end = time.perf_counter() + (self.deadline or np.inf)
+        end = time.perf_counter() + (np.inf if self.deadline is None else self.deadline)
         return lambda: time.perf_counter() > end
 
     def _blocks(self, order: np.ndarray) -> list[np.ndarray]:
-        count = -(-len(order) // self.block)
-        return np.split(np.resize(order, count * self.block), count)
+        return np.split(order, range(self.block, len(order), self.block))
 
     def _third(self, levels: list[Level], screen: Screen) -> Level:
         """Return the best sequences of two, extended by every third push."""

@@ -1,5 +1,7 @@
 """Pushes: their parameters, the grid of 72, the pusher's start and the commands."""
 
+import math
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -12,6 +14,7 @@ from sainet.scenes.geometry import direction, unit
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest, floats
 
+_TO_REST = 32 / 240  # s, after a push
 _PARAMETERS = ("contact_angle", "direction", "length", "speed")
 
 
@@ -110,6 +113,13 @@ def place_pusher(
 def push_direction(state: State, push: Push) -> Float[Array, "*batch 2"]:
     """Return the unit vector along which the pusher moves or pushes."""
     return unit(push_axis(state) + push.contact_angle + push.direction)
+
+
+def settled_steps(push: Push, time_step: float) -> int:
+    """Return the steps until pushes have ended and everything rests; not traced."""
+    moving = float(np.max(np.asarray(push.length) / np.asarray(push.speed)))
+    # A hair less than exact: 48.00001 steps of motion are 48.
+    return math.ceil(moving / time_step - 1e-3) + round(_TO_REST / time_step)
 
 
 def command_path(
