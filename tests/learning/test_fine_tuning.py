@@ -29,7 +29,13 @@ from sainet.models.inputs import push_frame
 from sainet.models.integrators import RelaxingResidual
 from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.digests import digests_from_text, pushes_overlap
-from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
+from sainet.runs.errors import (
+    BadCheckpoint,
+    BadInput,
+    BadStore,
+    RunConflict,
+    UnknownName,
+)
 from sainet.scenes.state import pack_motion
 
 PLANAR = find_internal_engine("planar")
@@ -334,6 +340,14 @@ def test_a_network_around_another_engine_is_refused(store, tmp_path):
             starting(TUNING, "sain-bullet"),
             tmp_path / "out",
         )
+
+
+def test_a_horizon_before_the_first_observation_is_refused(tmp_path):
+    info = info_of(6, bodies=2)
+    store = write(tmp_path / "ends", info, end_points_alone(made_up(info)))
+    with pytest.raises(BadStore, match="first 8 steps of any push; train on more `st"):
+        fit("in", store, TUNING.changed(steps=8), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_patience_needs_pushes_to_validate_on():

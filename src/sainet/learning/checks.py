@@ -46,12 +46,24 @@ def check_task(task: Task) -> None:
             f"`validation_share` is {share}; {path} has no two pushes that are not "
             "repeats of each other."
         )
+    _check_observed(task)
     if task.existing:
         _check_existing(task, task.existing)
     if task.has_single_steps:
         _check_single_steps(task)
     if task.recipe.features == "contact":
         _check_contacts(task)
+
+
+def _check_observed(task: Task) -> None:
+    """Raise `BadStore` if the first steps, on which networks train, are unknown."""
+    steps = task.recipe.horizon.steps
+    known = task.store.read(slice(None), ("pose_observed", "rate_observed"))
+    if not any(each[:, :steps].any() for each in known.values()):
+        raise BadStore(
+            f"{task.store.path}: nothing is observed in the first {steps} steps of any "
+            "push; train on more `steps`."
+        )
 
 
 def _check_simulator(task: Task) -> None:

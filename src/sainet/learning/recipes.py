@@ -292,11 +292,9 @@ def recipe_for(start: Start, features: str | None = None) -> Recipe:
 
     Args:
         start: random weights, a network, or the internal engine.
-        features: of the network; `contact` has a recipe of its own from the engine, and
-            its hold from a network.
+        features: of the network; `contact` has recipes of its own.
     """
-    recipe = replace(RECIPES[type(start)], start=start)
-    if features != "contact" or isinstance(start, Fresh):
-        return recipe
-    is_new = isinstance(start, FromSimulator)
-    return CONTACT if is_new else recipe.changed(hold=CONTACT.horizon.hold)
+    if features == "contact" and not isinstance(start, Fresh):
+        further = FINE_TUNING.changed(hold=CONTACT.horizon.hold, start=start)
+        return CONTACT if isinstance(start, FromSimulator) else further
+    return replace(RECIPES[type(start)], start=start)
