@@ -379,6 +379,7 @@ CONNECTIONS = {
     "pushes in two datasets, a split into another run": 14,
     "kinds of pushes in own tables, origins of datasets": 17,
     "planned pushes of any length, what reviews of all layers found": 28,
+    "disks that the internal engine assumes wrongly": 22,
     "a shorter training beside the paper's recipe": 27,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.

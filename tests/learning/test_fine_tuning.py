@@ -342,6 +342,22 @@ def test_a_network_around_another_engine_is_refused(store, tmp_path):
         )
 
 
+def test_an_engine_that_assumes_quite_other_disks_is_named(tmp_path, caplog):
+    info = info_of(6, bodies=2)
+    arrays = made_up(info)
+    arrays["mass"] = np.ones_like(arrays["mass"])
+    small = write(tmp_path / "small", info, arrays | {"radius": arrays["radius"] / 2})
+    fit("sain", small, TUNING.changed(iterations=1), tmp_path / "sain")
+    (said,) = caplog.messages
+    assert "radius is 0.02" in said
+    assert "the internal engine assumes 0.0525, 0.058 m; take planar-true" in said
+    caplog.clear()
+    fit("in", small, TUNING.changed(iterations=1), tmp_path / "in")
+    usual = write(tmp_path / "usual", info, arrays)
+    fit("sain", usual, TUNING.changed(iterations=1), tmp_path / "usual-sain")
+    assert not caplog.messages
+
+
 def test_a_horizon_before_the_first_observation_is_refused(tmp_path):
     info = info_of(6, bodies=2)
     store = write(tmp_path / "ends", info, end_points_alone(made_up(info)))

@@ -1,6 +1,6 @@
 """Checks that a training job can run, before its folder is made."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from sainet.learning.task import Existing, Task
 from sainet.models.card import CARD
 from sainet.models.identity import NETWORKS
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, require_one_of
+from sainet.scenes.quantities import MASS, RADIUS
+
+_ALIKE = 1.5  # times as large: networks still correct what the engine assumes wrongly
 
 
 def check_apart(stores: Sequence[Store]) -> None:
@@ -64,6 +67,26 @@ def _check_observed(task: Task) -> None:
             f"{task.store.path}: nothing is observed in the first {steps} steps of any "
             "push; train on more `steps`."
         )
+
+
+def other_disks(task: Task) -> Iterator[str]:
+    """Yield a warning for each property that the internal engine assumes wrongly."""
+    if task.inner is None:
+        return
+    assumed = task.inner.simulator.assumptions
+    given = task.store.read(slice(None), ("mass", "radius"))
+    for each, listed in ((MASS, assumed.mass), (RADIUS, assumed.radius)):
+        if listed is None:
+            continue
+        known = np.mean(given[each.name], axis=0)[: len(listed)]
+        ratio = known / listed[: len(known)]
+        if max(ratio.max(), 1 / ratio.min()) > _ALIKE:
+            here, there = (", ".join(f"{x:.3g}" for x in xs) for xs in (known, listed))
+            yield (
+                f"{task.store.path}: {each.name} is {here} {each.unit}, but the "
+                f"internal engine assumes {there} {each.unit}; take planar-true, or "
+                "the folder of an identified engine."
+            )
 
 
 def _check_simulator(task: Task) -> None:

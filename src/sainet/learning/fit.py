@@ -7,6 +7,7 @@ from pathlib import Path
 
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
+from sainet.learning.checks import other_disks
 from sainet.learning.job import Job, begin, finish
 from sainet.learning.log import LogLine, read_log
 from sainet.learning.mixture import Batches
@@ -66,6 +67,9 @@ def fit(
     if job is None:
         _log.info("%s is already finished", out)
         return FitResult(out, read_log(out))
+    for task in job.mixture.tasks:
+        for warning in other_disks(task):
+            _log.warning("%s", warning)
     complete(job, on_step)
     return FitResult(out, tuple(job.progress.history))
 
