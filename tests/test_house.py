@@ -378,7 +378,7 @@ CONNECTIONS = {
     "timing starts and own pushes, processes loaded on demand": 12,
     "pushes in two datasets, a split into another run": 14,
     "kinds of pushes in own tables, origins of datasets": 17,
-    "planned pushes of any length, what reviews of all layers found": 28,
+    "planned pushes of any length, what reviews of all layers found": 30,
     "disks that the internal engine assumes wrongly": 22,
     "a shorter training beside the paper's recipe": 27,
     # Shares of datasets, trials and evaluations, the options of five commands, and
@@ -409,8 +409,8 @@ COUNTS = {
         # Models, steps and names of a user's own wherever one plans or identifies, and
         # what is said of wrong arguments: 126 lines more than before. Figures of errors
         # disk by disk and of ranges: 50 more. Leading axes of controls, bounds in
-        # single precision: 7.
-        3_723,
+        # single precision, numbers of pushes and steps: 9.
+        3_725,
         3_540,
     ),
     "code lines of engines from MJCF": (

@@ -14,7 +14,8 @@ import sainet as sn
 train, test = sn.open_pushes("runs/recorded").split(test=0.2, seed=0)  # own data
 fitted = sn.identify(train)
 network = sn.tune("sain", train, engine=fitted)
-table = sn.evaluate(["physics", "physics-true", fitted, network], test)
+models = {"physics-true": "physics-true", "fitted": fitted, "sain": network}
+table = sn.evaluate({"physics": "physics", **models}, test)
 print(table.verdict())
 table.to_pandas()
 table.save("report.html")

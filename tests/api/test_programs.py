@@ -37,11 +37,11 @@ def few_iterations(monkeypatch):
 def test_own_data(folder, monkeypatch, few_iterations, capsys):
     monkeypatch.chdir(folder)
     names = run(OWN_DATA)
-    assert "SAIN, identified, residual errs by" in capsys.readouterr().out
+    assert "sain errs by" in capsys.readouterr().out
     assert names["table"].to_pandas()["model"].unique().tolist() == [
-        *("physics", "physics-true", "physics-identified", "sain-identified-residual")
+        *("physics", "physics-true", "fitted", "sain")
     ]
-    assert "SAIN, identified, residual errs by" in (folder / "report.html").read_text()
+    assert "sain errs by" in (folder / "report.html").read_text()
     # Nothing else was left behind.
     assert {path.name for path in folder.iterdir()} == {"runs", "report.html"}
     assert [path.name for path in (folder / "runs").iterdir()] == ["recorded"]

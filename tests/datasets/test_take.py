@@ -28,9 +28,12 @@ def test_other_pushes_have_another_content_hash(store):
     assert store.first(12).content == store.content
 
 
-@pytest.mark.parametrize("pushes", [0, -1, 13])
-def test_more_pushes_than_stored_are_refused(store, pushes):
-    with pytest.raises(BadInput, match=f"has 12 pushes, not {pushes}"):
+@pytest.mark.parametrize(
+    ("pushes", "words"),
+    [(0, "`pushes` is 0; it must be at least 1"), (13, "has 12 pushes, not 13")],
+)
+def test_more_pushes_than_stored_are_refused(store, pushes, words):
+    with pytest.raises(BadInput, match=words):
         store.first(pushes)
 
 

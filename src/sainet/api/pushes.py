@@ -113,6 +113,8 @@ class Pushes:
             `truth` [push, time, body, 6] has x, y (m), angle (rad) and their rates,
             NaN where `pose_observed` or `rate_observed` [push, time] is False.
         """
+        if steps is not None:
+            require_count("steps", steps)
         return to_batch(self.store.read(slice(None)), self.store.info, steps=steps)
 
 

@@ -15,7 +15,8 @@ from sainet.api.table import ErrorTable
 from sainet.datasets import Scheme
 from sainet.evaluation.recommendation import Recommendation
 from sainet.report.table import Table
-from sainet.runs.errors import require, require_one_of
+from sainet.runs.errors import require_one_of
+from sainet.scenes.quantities import require_count
 from sainet.studies import USUAL_CANDIDATES, CandidateName
 from sainet.studies.candidates import candidates_named
 from sainet.studies.runner import Progress, Runner
@@ -81,7 +82,7 @@ def cross_validate(
         BadInput: the inputs of a model are the same in all pushes.
         UnknownName: there is no model of a name.
     """
-    require(folds > 1, "folds", "at least 2", folds)
+    require_count("folds", folds, low=2)
     schemes: Sequence[Scheme] = (by,) if isinstance(by, str) else tuple(by)
     for scheme in schemes:
         require_one_of("by", scheme, get_args(Scheme))

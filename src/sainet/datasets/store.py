@@ -19,6 +19,7 @@ from sainet.runs.documents import content_hash, read_document, read_file, readab
 from sainet.runs.errors import BadInput, BadStore, hint, shown
 from sainet.runs.folders import CONFIG, remake
 from sainet.runs.manifest import MANIFEST
+from sainet.scenes.quantities import require_count
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,8 @@ class Store:
         Raises:
             BadInput: the store has fewer pushes.
         """
-        if not 1 <= pushes <= self.info.pushes:
+        require_count("pushes", pushes)
+        if pushes > self.info.pushes:
             raise BadInput(f"{self.path} has {self.info.pushes} pushes, not {pushes}.")
         return self if pushes == self.info.pushes else self.take(range(pushes))
 

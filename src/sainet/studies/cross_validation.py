@@ -23,6 +23,7 @@ from sainet.models.card import read_identified
 from sainet.models.identity import ModelId
 from sainet.models.library import load_model
 from sainet.models.model import Model
+from sainet.runs.errors import require
 from sainet.studies.candidates import Candidate
 from sainet.studies.recorded_models import IDENTIFIED, surfaces_of
 from sainet.studies.recorded_pushes import JoinFolds
@@ -145,6 +146,8 @@ def cross_validated(
         BadStore: the pushes do not suffice for so many folds, or for a model.
         BadInput: the inputs of a model are the same in all pushes.
     """
+    differ = 0 < len(schemes) == len(set(schemes))
+    require(differ, "by", "one or more different divisions", " ".join(schemes))
     surfaces = surfaces_of(store)
     parts: list[Step[Measurements]] = []
     unions: list[Condition] = []
