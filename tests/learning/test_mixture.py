@@ -118,7 +118,9 @@ def test_pooled_statistics_are_those_of_all_numbers():
 
 def test_what_varies_in_no_dataset_does_not_widen_what_varies_between_them():
     def scales(mean, deviation, size):
-        body, pair = jnp.array([mean, 2.0]), jnp.array([0.0])
+        rounded = np.nextafter(np.float32(0.8), np.float32(1))  # of one dataset
+        constant = 0.8 if size == CONSTANT else rounded
+        body, pair = jnp.array([mean, constant]), jnp.array([0.0])
         return Scales(
             *(pair, jnp.ones(1), body, jnp.array([deviation, CONSTANT])),
             jnp.array([size, size, CONSTANT]),

@@ -226,7 +226,7 @@ def test_blocks_contain_every_first_push_once():
 @pytest.mark.parametrize(
     ("length", "speed", "time_step"),
     [(0.01, 0.05, 1 / 240), (0.01, 0.02, 1 / 240), (0.03, 0.05, 1 / 240)]
-    + [(0.01, 0.05, 1 / 1000)],
+    + [(0.01, 0.05, 1 / 1000), (0.01, 0.3, 1 / 240), (0.03, 0.5, 1 / 240)],
 )
 def test_pushes_are_predicted_until_everything_rests(length, speed, time_step):
     slow = replace(SCENE, time_step=time_step)
@@ -243,6 +243,10 @@ def test_pushes_are_predicted_until_everything_rests(length, speed, time_step):
 
 def test_the_papers_pushes_take_48_steps_and_32_to_rest():
     assert settled_steps(PushGrid().pushes(), SCENE.time_step) == 80
+    none = jax.tree.map(lambda x: x[:0], PushGrid().pushes())
+    assert settled_steps(none, SCENE.time_step) == 32
+    with pytest.raises(BadScene, match="push: speed is 0"):
+        settled_steps(PushGrid(speed=0.0).pushes(), SCENE.time_step)
 
 
 def moved():

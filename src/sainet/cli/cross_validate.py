@@ -88,7 +88,7 @@ class CrossValidate:
                 found = cross_validate(store, self.by, self.folds, models, runner)
         page = found.write(self.out, self.data)
         for sentence in found.coverage:
-            self.output.console.print(sentence, soft_wrap=True)
+            self.output.console.print(sentence, markup=False, soft_wrap=True)
         print_table(found.table, self.output.console)
         counts = {name: len(rows) for name, rows in surfaces_of(store).items()}
         following = self._commands(found.recommended, counts)

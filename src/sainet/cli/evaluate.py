@@ -91,7 +91,7 @@ class Evaluate:
         print_table(arrange(summary), self.output.console)
         covered = coverage_of(measured)
         for sentence in in_words(covered):
-            self.output.console.print(sentence, soft_wrap=True)
+            self.output.console.print(sentence, markup=False, soft_wrap=True)
         if self.table is not None:
             write_table(arrange(summary), self.table)
         self._write_page(models, store, measured)

@@ -56,10 +56,10 @@ class Changes:
     features: Features | ProcessFeatures | None = None
     """Inputs of a network: paper; place adds the position on the table and the absolute
     angle, for pushes on the same part of one table; contact: features of each contact
-    in its own frame, for any number of disks (only from the engine). Inputs of a
-    Gaussian process: angle is the contact angle; side adds the side of the disk; place
-    adds the side, and the position and directions on the table (default: paper; side
-    for a Gaussian process)."""
+    in its own frame, for any number of disks (only from the engine or from a network
+    with these inputs). Inputs of a Gaussian process: angle is the contact angle; side
+    adds the side of the disk; place adds the side, and the position and directions on
+    the table (default: paper; side for a Gaussian process)."""
     choose: bool = False
     """Choose the kernel of a Gaussian process, and its inputs up to the given features,
     by cross-validation on the pushes (takes up to nine times as long)."""

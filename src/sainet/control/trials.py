@@ -173,7 +173,8 @@ def run_trial(
             episode.reason = str(error) or episode.reason
             left = path.with_suffix(".interrupted.json")
             # A robot that cannot observe must not be asked where the disks are now.
-            write_document(left, record(config, index, trial, episode, episode.final))
+            end = episode.final if isinstance(error, SainetError) else None
+            write_document(left, record(config, index, trial, episode, end))
             raise
     write_document(path, record(config, index, trial, episode))
     path.with_suffix(".interrupted.json").unlink(missing_ok=True)

@@ -132,14 +132,18 @@ def to_json(found: Sequence[Coverage]) -> dict[str, object]:
     return {"coverage": msgspec.to_builtins(found)} if found else {}
 
 
+_UNKNOWN = "–"  # noqa: RUF001
+
+
 def _cells(found: Coverage) -> list[str]:
     unit = "°" if found.kind == "rot" else " mm"
     ends = [found.inside, found.size, found.score, found.over_plain]
     digits = [1, 2, 2, 2]
     numbers = [
-        "–"  # noqa: RUF001
-        if None in msgspec.structs.astuple(each)
-        else f"{each.value:.{n}f} [{each.low:.{n}f}, {each.high:.{n}f}]"
+        _UNKNOWN
+        if each.value is None or each.low is None
+        else f"{each.value:.{n}f} [{each.low:.{n}f}, "
+        f"{_UNKNOWN if each.high is None else format(each.high, f'.{n}f')}]"
         for each, n in zip(ends, digits, strict=True)
     ]
     numbers[1], numbers[2] = numbers[1] + unit, numbers[2] + unit

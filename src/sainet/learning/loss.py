@@ -192,9 +192,13 @@ def _spread(
             mean = jnp.where(jnp.array(signs) < 0, 0.0, mean)
         spread = (rows - mean[:, None]) ** 2
         deviation = jnp.sqrt(jnp.sum(spread * shares[None], axis=1))
-    # A feature that never varies must not be divided by rounding errors.
+    return mean, known_deviation(mean, deviation)
+
+
+def known_deviation(mean: Array, deviation: Array) -> Array:
+    """Return deviations, `CONSTANT` where they are rounding errors of the mean."""
     varies = deviation > jnp.maximum(_CONSTANT, _CONSTANT_SHARE * jnp.abs(mean))
-    return mean, jnp.where(varies, deviation, CONSTANT)
+    return jnp.where(varies, deviation, CONSTANT)
 
 
 @eqx.filter_jit

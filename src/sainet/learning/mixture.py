@@ -15,7 +15,7 @@ from jaxtyping import UInt64
 from sainet.datasets.batch import PushBatch
 from sainet.datasets.store import Store
 from sainet.learning.checks import check_apart, check_task
-from sainet.learning.loss import CONSTANT, LossWeights
+from sainet.learning.loss import CONSTANT, LossWeights, known_deviation
 from sainet.learning.sources import source_of
 from sainet.learning.step import FitState, data_loss, even_batch, first_state
 from sainet.learning.task import Task, first_network, settings, statistics
@@ -149,10 +149,9 @@ def pool(scales: Sequence[Scales], bodies: Sequence[int]) -> Scales:
 def _pooled(each: Sequence[tuple[jax.Array, jax.Array]]) -> tuple[jax.Array, jax.Array]:
     means, deviations = (jnp.stack(x) for x in zip(*each, strict=True))
     mean = jnp.mean(means, axis=0)
-    varies = deviations != CONSTANT
-    within = jnp.where(varies, deviations, 0.0) ** 2 + (means - mean[None]) ** 2
-    size = jnp.sqrt(jnp.mean(within, axis=0))
-    return mean, jnp.where(varies.any(axis=0) | (size > 0), size, CONSTANT)
+    within = jnp.where(deviations == CONSTANT, 0.0, deviations) ** 2
+    whole = jnp.mean(within + (means - mean[None]) ** 2, axis=0)
+    return mean, known_deviation(mean, jnp.sqrt(whole))
 
 
 class Batches:

@@ -9,12 +9,15 @@ from jax import dtypes
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
+from sainet.runs.errors import BadScene
 from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.geometry import direction, unit
+from sainet.scenes.quantities import SPEED, STROKE
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest, floats
 
-_TO_REST = 32 / 240  # s, after a push
+_TO_REST = 32 / 240  # s, after a push, at least
+_BRAKING = 1.0  # m/s^2, of a disk that slides on a smooth table
 _PARAMETERS = ("contact_angle", "direction", "length", "speed")
 
 
@@ -117,9 +120,17 @@ def push_direction(state: State, push: Push) -> Float[Array, "*batch 2"]:
 
 def settled_steps(push: Push, time_step: float) -> int:
     """Return the steps until pushes have ended and everything rests; not traced."""
-    moving = float(np.max(np.asarray(push.length) / np.asarray(push.speed)))
+    STROKE.check(push.length, "push: length", error=BadScene)
+    SPEED.check(push.speed, "push: speed", error=BadScene)
+    length, speed, step = (
+        np.asarray(push.length),
+        np.asarray(push.speed),
+        float(time_step),
+    )
+    moving = float(np.max(length / speed, initial=0.0))
+    resting = float(np.max(speed / _BRAKING, initial=_TO_REST))
     # A hair less than exact: 48.00001 steps of motion are 48.
-    return math.ceil(moving / time_step - 1e-3) + round(_TO_REST / time_step)
+    return math.ceil(moving / step - 1e-3) + round(resting / step)
 
 
 def command_path(

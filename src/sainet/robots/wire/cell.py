@@ -213,7 +213,9 @@ class Cell(_Section, frozen=True, kw_only=True):
     @property
     def digest(self) -> str:
         """The hash of what recordings depend on, not of how the arm is reached."""
-        parts = self.surface, self.disks, self.pusher, self.frictions, self.calibration
+        pusher = self.pusher.radius_mm, self.pusher.push_height_mm
+        places = self.calibration.points
+        parts = self.surface, self.disks, pusher, self.frictions, places
         return content_hash(msgspec.json.encode(parts))
 
     @property
