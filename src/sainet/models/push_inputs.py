@@ -116,9 +116,8 @@ def predict_push(
     """Return the predicted motion of pushes, with the leading axes of all parts."""
     scene, state, push = widened(scene, state, push)
     initial, controls = command_path(scene, state, push, steps=steps)
-    if (
-        0 in scene.batch_shape
-    ):  # networks reshape, which an axis of no pushes does not allow
+    # Networks reshape, which an axis of no pushes does not allow.
+    if 0 in scene.batch_shape:
         return Trajectory(
             jax.tree.map(lambda x: jnp.zeros((0, steps, *x.shape[1:])), initial)
         )

@@ -14,13 +14,7 @@ from jaxtyping import Array, Float
 from sainet.models.dynamics import AbstractDynamics, check_purpose
 from sainet.models.library import Loadable, as_model
 from sainet.planning.checks import check_observation, doubts
-from sainet.planning.levels import (
-    Found,
-    Problem,
-    batch_of,
-    predicted_ends,
-    roll_pushes,
-)
+from sainet.planning.levels import Found, Problem, batch_of, predicted_ends, roll_pushes
 from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid, settled_steps
 from sainet.scenes.scene import Scene
