@@ -15,13 +15,17 @@ PUSHES, FOLDS = 40, 4
 EVERY = np.arange(PUSHES)
 
 
-def spread(seed=0, turned=0.0):
-    """Pushes of one disk all over the table, from all sides, in all directions."""
+def spread(seed=0, around=None):
+    """Pushes of one disk all over the table, from all sides, in all directions.
+
+    Sides and directions (rad) are random, or as given.
+    """
     rng = np.random.default_rng(seed)
     info = info_of(PUSHES, bodies=1, has_repeats=True)
     arrays = made_up(info, seed=seed)
     place = rng.uniform([-0.3, -0.05], [0.3, 0.05], (PUSHES, 2))
     angle, side, ahead = rng.uniform(-np.pi, np.pi, (3, PUSHES))
+    side, ahead = (side, ahead) if around is None else (around, around)
     normal = np.stack([np.cos(side + angle), np.sin(side + angle)], axis=-1)
     pusher = place - 0.06 * normal
     heading = np.stack([np.cos(ahead), np.sin(ahead)], axis=-1)
@@ -29,7 +33,7 @@ def spread(seed=0, turned=0.0):
     initial = np.zeros((PUSHES, 1, 6))
     initial[:, 0, :2], initial[:, 0, 2] = place, angle
     arrays |= {"initial": initial, "initial_pusher": pusher, "command_position": path}
-    values = {"place": place[:, 0], "direction": ahead, "side": np.mod(side, 2 * np.pi)}
+    values = {"place": place[:, 0], "direction": ahead, "side": side}
     arrays |= {"repeat": np.arange(PUSHES) // 2}
     return info, arrays, values | {"order": EVERY}
 
@@ -45,11 +49,22 @@ def test_blocks_are_ranges_of_equal_size(spread_out, scheme):
     store, values = spread_out
     owner = folds_by(store, scheme, FOLDS, EVERY)
     assert np.bincount(owner).tolist() == [PUSHES // FOLDS] * FOLDS
-    ends = sorted(
-        (values[scheme][owner == n].min(), values[scheme][owner == n].max())
-        for n in range(FOLDS)
-    )
-    assert all(high < low for (_, high), (low, _) in zip(ends, ends[1:], strict=False))
+    in_order = owner[np.argsort(np.mod(values[scheme], 2 * np.pi))]
+    if scheme in ("place", "order"):
+        in_order = owner[np.argsort(values[scheme])]
+        assert in_order[0] != in_order[-1]
+    assert (in_order != np.roll(in_order, 1)).sum() == FOLDS
+
+
+@pytest.mark.parametrize("scheme", ["direction", "side"])
+@pytest.mark.parametrize("turned", [0.0, 0.5, np.pi / 4, 3.0])
+def test_no_direction_is_cut_where_the_angle_jumps(tmp_path, scheme, turned):
+    """Eight nominal directions, measured to a milliradian, fill four folds."""
+    number = EVERY % 8
+    noise = np.random.default_rng(0).normal(0, 1e-3, PUSHES)
+    info, arrays, _ = spread(around=turned + number * np.pi / 4 + noise)
+    owner = folds_by(write(tmp_path / "data", info, arrays), scheme, FOLDS, EVERY)
+    assert all(len(set(owner[number == n])) == 1 for n in range(8))
 
 
 def test_repeats_and_chains_stay_together(tmp_path):

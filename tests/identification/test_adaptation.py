@@ -29,22 +29,28 @@ PUSHES = [(0.3, 0.2), (-0.5, 0.1), (0.8, -0.3), (-0.2, -0.4), (0.6, 0.4), (-0.8,
 
 
 @eqx.filter_jit
-def executed(scene, angles, heading):
+def executed(scene, push, steps):
     one = jax.tree.map(lambda x: x[None], scene)
     state = jax.tree.map(lambda x: x[None], scene.in_a_row())
-    push = jax.tree.map(lambda x: x[None], Push(angles, heading))
-    initial, controls = command_path(one, state, push, steps=STEPS)
+    push = jax.tree.map(lambda x: x[None], push)
+    initial, controls = command_path(one, state, push, steps=steps)
     return initial, ENGINE.rollout(one, initial, controls).states
 
 
-def recording_of(scene, angle, heading, trouble=""):
+def recording_of(scene, angle, heading, trouble="", length=0.01, steps=STEPS):
     """A noise-free push of two touching disks with these true properties."""
-    initial, states = executed(scene, jnp.float32(angle), jnp.float32(heading))
+    push = Push(jnp.float32(angle), jnp.float32(heading), jnp.float32(length))
+    initial, states = executed(scene, push, steps)
     pose = lambda s: np.concatenate([s.position[0], s.angle[0][..., None]], axis=-1)  # noqa: E731
     path = np.concatenate([initial.pusher_position, states.pusher_position[0]])
     whole = np.concatenate([pose(initial)[None], pose(states)])
+    sent = Push(angle, heading, length)
     return Recording(
-        time=np.arange(STEPS + 1) / 240, pose=whole, pusher=path, trouble=trouble
+        time=np.arange(steps + 1) / 240,
+        pose=whole,
+        pusher=path,
+        commanded=sent,
+        trouble=trouble,
     )
 
 
@@ -68,6 +74,17 @@ def test_wrong_radii_are_corrected_by_few_pushes(radius):
     before = np.abs(given.radius / TRUE.radius - 1)
     left = np.abs(found.radius / TRUE.radius - 1)
     assert (np.asarray(left) < 0.25 * np.asarray(before)).all()
+
+
+def test_long_pushes_count_to_their_ends():
+    """A push of 40 mm takes 0.8 s, and adapts as one of 10 mm does."""
+    given = wrong(TRUE, radius=(0.95, 1.05))
+    adaptation = Adaptation(load_model("physics-true"), given)
+    for angle, heading in PUSHES:
+        push = recording_of(TRUE, angle, heading, length=0.04, steps=240)
+        adaptation.add(push)
+    _, found = adaptation.adapted(TRUE.in_a_row())
+    assert np.allclose(found.radius, TRUE.radius, rtol=0.01)
 
 
 def test_properties_without_effect_stay_as_given():

@@ -12,7 +12,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array
 
-from sainet.engines.base import AbstractEngine
+from sainet.engines.base import AbstractEngine, AssumedProperties
 from sainet.engines.simulator import OWN, InternalEngine, OwnSpec
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.identity import ModelId
@@ -253,3 +253,18 @@ def own_model(engine: AbstractPathEngine, spec: OwnSpec) -> Model:
     OWN[spec.name] = engine
     identity = ModelId(kind="physics", simulator=spec, name=spec.name)
     return Model(identity, PhysicsDynamics(spec.build()), internal=InternalEngine(spec))
+
+
+def register(model: Model) -> None:
+    """Register the engine of a model anew, if it is a user's own.
+
+    Another one of the same name may have been made since.
+    """
+    match model:
+        case Model(
+            identity=ModelId(simulator=OwnSpec(name=name)),
+            dynamics=PhysicsDynamics(engine=AssumedProperties(engine=engine)),
+        ):
+            OWN[name] = engine
+        case _:
+            pass

@@ -6,6 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Literal, cast, get_args
 
+from sainet.api.engines import register
 from sainet.api.models import Loadable, load
 from sainet.api.progress import shown_progress
 from sainet.api.pushes import Dataset, store_of
@@ -206,6 +207,7 @@ def _internal(engine: Loadable) -> InternalEngine:
             f"`engine` is {found.name}; it must be physics: identified, an engine of "
             f"your own, or one of {', '.join(SIMULATORS)}."
         )
+    register(found)
     return found.internal
 
 

@@ -1,5 +1,6 @@
 """Files of predictions that were made elsewhere, as models."""
 
+import csv
 import io
 import zipfile
 from collections.abc import Callable, Mapping
@@ -199,7 +200,8 @@ def _arrays(path: Path, data: bytes) -> Mapping[str, np.ndarray]:
 
 
 def _from_csv(path: Path, data: bytes) -> _Content:
-    header = data.partition(b"\n")[0].decode("utf-8-sig", "replace").strip().split(",")
+    first = data.partition(b"\n")[0].decode("utf-8-sig", "replace")
+    header = [name.strip() for name in next(csv.reader([first]), [])]
     are_hashes, has_steps = "hash" in header, "step" in header
     numbers = ("body", *_POSE, *(["step"] if has_steps else []))
     columns = Columns(

@@ -18,7 +18,7 @@ from sainet.datasets.generate import generate as simulate
 from sainet.datasets.splits import split
 from sainet.datasets.store import Store, open_store
 from sainet.runs.errors import require
-from sainet.scenes.quantities import require_count
+from sainet.scenes.quantities import require_count, require_seed
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Pushes:
         """
         is_number = isinstance(test, Real)
         require(is_number and 0 < test < 1, "test", "above 0 and below 1", test)
-        require_count("seed", seed, low=0)
+        require_seed(seed)
         training, tests = split(self.store, test, seed, chains=chains)
         return replace(self, store=training), replace(self, store=tests)
 

@@ -26,6 +26,8 @@ COMMANDS = (
     "sainet generate robot --pushes 4500 --engine bullet "
     "--assumed-engine bullet planar --out bullet",
     "sainet train sain --data pushes --out network",
+    "sainet train sain --data pushes --decay cosine --iterations 5000 "
+    "--short-iterations 2500 --out shorter",
     "sainet generate robot --disks 1 --pushes 500 --out own",
     "sainet tune gp --data own --out gp",
     "sainet cross-validate --data own --pushes 300 --out validated",

@@ -10,8 +10,9 @@ from sainet.cli.devices import use_cache, use_devices
 from sainet.cli.output import Json, Output, progress_bar
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.recorded.units import Units
-from sainet.runs.errors import BadInput, require
+from sainet.runs.errors import BadInput
 from sainet.runs.executors import Machines
+from sainet.scenes.quantities import require_seed
 from sainet.worlds.config import SetupName
 
 if TYPE_CHECKING:
@@ -189,7 +190,7 @@ class AddBystander:
         from sainet.datasets.bystander import add_bystander
         from sainet.datasets.store import open_store
 
-        require(self.seed >= 0, "seed", "at least 0", self.seed)
+        require_seed(self.seed)
         store = open_store(self.data)
         total = store.info.pushes * len(store.info.assumed_engines)
         with progress_bar("Simulator predictions", total, self.output) as advance:

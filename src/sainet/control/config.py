@@ -9,9 +9,10 @@ from sainet.robots import RobotConfig
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import (
     ALIGNMENT,
-    LARGEST_COUNT,
+    LARGEST_SEED,
     MOST_PUSHES,
     require_count,
+    require_seed,
 )
 from sainet.tasks import Goals
 
@@ -19,7 +20,7 @@ GivenProperties = Literal["true", "assumed"]
 _COUNTS = {
     "trials": (1, 1_000_000),
     "pushes": (1, 1_000_000),
-    "seed": (0, LARGEST_COUNT),
+    "seed": (0, LARGEST_SEED),
 }
 _LEAST_ROW = 2  # disks
 _LEAST_TOLERANCE = 1e-6  # of a radius
@@ -169,7 +170,7 @@ class CollectConfig(RobotConfig):
         super().__post_init__()
         for name in ("pushes", "repeats"):
             require_count(name, getattr(self, name), high=MOST_PUSHES)
-        require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
+        require_seed(self.seed)
         low, high = _GAP_MM
         good = low <= self.gap_mm <= high
         require(good, "gap_mm", f"from {low:g} to {high:g}", self.gap_mm)

@@ -6,7 +6,7 @@ from typing import get_args
 from sainet.engines import ENGINES
 from sainet.engines.simulator import SIMULATORS
 from sainet.runs.errors import require, require_one_of
-from sainet.scenes.quantities import LARGEST_COUNT, MOST_PUSHES, require_count
+from sainet.scenes.quantities import MOST_PUSHES, require_count, require_seed
 from sainet.worlds.config import SetupName, WorldConfig
 
 
@@ -48,4 +48,4 @@ class GenerateConfig(WorldConfig):
         require(different, "assumed_engine", wanted, self.assumed_engine)
         for name in ("pushes", "chunk_size"):
             require_count(name, getattr(self, name), high=MOST_PUSHES)
-        require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
+        require_seed(self.seed)

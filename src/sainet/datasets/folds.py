@@ -74,7 +74,21 @@ def _values(store: Store, scheme: Scheme) -> Float[np.ndarray, " push"]:
         return place @ _longest_axis(place)
     if scheme == "order":
         return np.arange(len(place), dtype=float)
-    return _direction(arrays) if scheme == "direction" else _side(arrays)
+    angles = _direction(arrays) if scheme == "direction" else _side(arrays)
+    return _from_widest_gap(angles)
+
+
+def _from_widest_gap(angles: Float[np.ndarray, " push"]) -> Float[np.ndarray, " push"]:
+    """Return angles (rad) counted from the end of the widest gap between them.
+
+    So no block of neighbours is cut where the angle jumps by a full turn.
+    """
+    turn = 2 * np.pi
+    angles = np.mod(angles, turn)
+    around = np.sort(angles)
+    gaps = np.diff(around, append=around[0] + turn)
+    first = around[(np.argmax(gaps) + 1) % len(around)]
+    return np.mod(angles - first, turn)
 
 
 def _direction(arrays: Arrays) -> Float[np.ndarray, " push"]:
@@ -85,10 +99,10 @@ def _direction(arrays: Arrays) -> Float[np.ndarray, " push"]:
 
 
 def _side(arrays: Arrays) -> Float[np.ndarray, " push"]:
-    """Return where on its circumference the disk is pushed, from 0 to 2 pi (rad)."""
+    """Return where on its circumference the disk is pushed (rad)."""
     disk = arrays["initial"][:, 0, :3]
     normal = disk[:, :2] - arrays["initial_pusher"]
-    return np.mod(np.arctan2(normal[:, 1], normal[:, 0]) - disk[:, 2], 2 * np.pi)
+    return np.arctan2(normal[:, 1], normal[:, 0]) - disk[:, 2]
 
 
 def _blocks(values: Float[np.ndarray, " push"], count: int) -> Int[np.ndarray, " push"]:

@@ -14,7 +14,7 @@ from sainet.datasets.store import Store
 from sainet.datasets.writer import write_once
 from sainet.runs.errors import BadInput, RunConflict, require
 from sainet.runs.manifest import MANIFEST
-from sainet.scenes.quantities import require_count
+from sainet.scenes.quantities import require_seed
 
 _SPLIT_STREAM, _FOLD_STREAM = 0x5B117, 0xF01D
 
@@ -143,7 +143,7 @@ def write_split(
         RunConflict: a folder holds something else.
     """
     require(0 < test < 1, "test", "above 0 and below 1", test)
-    require_count("seed", seed, low=0)
+    require_seed(seed)
     parts = split(store, test, seed, chains=chains)
     settings = {"command": "split", "data": store.content, "test": float(test)}
     settings |= {"seed": int(seed), "chains": chains}

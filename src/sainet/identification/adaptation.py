@@ -28,12 +28,14 @@ from sainet.models.model import Model
 from sainet.models.wrappers import with_camera
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import PathControls
+from sainet.scenes.pushes import settled_steps
 from sainet.scenes.recording import AGREES, CameraOffset, Recording
-from sainet.scenes.scene import Scene, pair_gaps
+from sainet.scenes.scene import TIME_STEP, Scene, pair_gaps
 from sainet.scenes.state import State, at_rest
 
 REMEMBERED = 24  # pushes: older ones are forgotten, because surfaces change
-SETTLED = 80  # steps after which everything rests
+_UNKNOWN = 80  # steps after which everything rests, of an unknown push
+_BUCKET = 80  # steps: arrays are a multiple, so that few sizes are compiled
 # Standard deviations of the prior, of logarithms.
 PRIOR = {"radius": 0.08, "mass": 0.1, "friction": 0.4, "pressure": 0.2}
 # Of the errors of the engine with true properties at the end of a push.
@@ -94,6 +96,26 @@ class _Given(NamedTuple):
     ratio: Float[Array, ""]
 
 
+class _Settled(NamedTuple):
+    """A push, and the steps after which everything rests."""
+
+    push: ResampledPush
+    steps: int
+
+    def end(self) -> Float[np.ndarray, "body 3"]:
+        """Return the mean of the poses at rest, or else the last known pose."""
+        pose = self.push.motion[..., :3]
+        known = pose[np.isfinite(pose).all(axis=(1, 2))]
+        settled = pose[self.steps :]
+        settled = settled[np.isfinite(settled).all(axis=(1, 2))]
+        return settled.mean(axis=0) if len(settled) else known[-1]
+
+    def path(self, steps: int) -> Float[np.ndarray, "step 2"]:
+        """Return the path until everything rests; the pusher then holds still."""
+        last = min(self.steps, len(self.push.pusher)) - 1
+        return self.push.pusher[np.minimum(np.arange(steps), last)]
+
+
 def check_adapts(model: Model) -> None:
     """Raise `BadInput` if a model is physics without the planar engine."""
     simulator = model.internal and model.internal.simulator
@@ -118,9 +140,7 @@ class Adaptation:
 
     model: Model
     scene: Scene
-    _pushes: "deque[ResampledPush]" = field(
-        default_factory=lambda: deque(maxlen=REMEMBERED)
-    )
+    _pushes: "deque[_Settled]" = field(default_factory=lambda: deque(maxlen=REMEMBERED))
 
     def __post_init__(self) -> None:
         """Find what the engine assumes.
@@ -143,9 +163,10 @@ class Adaptation:
         """Remember a push; one whose end is unknown is left out."""
         if recording.trouble:
             return
-        push = resample(recording)
+        push, sent = resample(recording), recording.commanded
         if push.steps >= 1 and np.isfinite(push.motion[..., :3]).all(axis=(1, 2)).any():
-            self._pushes.append(push)
+            steps = settled_steps(sent, TIME_STEP) if sent else _UNKNOWN
+            self._pushes.append(_Settled(push, steps))
 
     def adapted(self, state: State) -> tuple[AbstractDynamics, Scene]:
         """Return model and scene with the properties estimated from the pushes so far.
@@ -174,31 +195,19 @@ class Adaptation:
         shape = (REMEMBERED, *apart.shape)
         start, end = np.broadcast_to(apart, (2, *shape)).copy()
         pusher, weight = np.full((REMEMBERED, 2), -1.0), np.zeros(REMEMBERED)
-        path = np.full((REMEMBERED, SETTLED, 2), -1.0)
-        for row, push in enumerate(self._pushes):
+        longest = max((each.steps for each in self._pushes), default=_BUCKET)
+        steps = -(-longest // _BUCKET) * _BUCKET
+        path = np.full((REMEMBERED, steps, 2), -1.0)
+        for row, each in enumerate(self._pushes):
+            push = each.push
             start[row], pusher[row] = push.initial, push.initial_pusher + offset
-            path[row] = _first_steps(push.pusher) + offset
-            end[row], weight[row] = _end(push), 1.0
+            path[row] = each.path(steps) + offset
+            end[row], weight[row] = each.end(), 1.0
         arrays = (start, pusher, path, end, weight)
         return _Pushes(*(jnp.asarray(each, jnp.float32) for each in arrays))
 
 
 _NOTHING = Assumptions()
-
-
-def _end(push: ResampledPush) -> Float[np.ndarray, "body 3"]:
-    """Return the mean of the poses at rest, or else the last known pose."""
-    pose = push.motion[..., :3]
-    known = pose[np.isfinite(pose).all(axis=(1, 2))]
-    settled = pose[SETTLED:]
-    settled = settled[np.isfinite(settled).all(axis=(1, 2))]
-    return settled.mean(axis=0) if len(settled) else known[-1]
-
-
-def _first_steps(path: Float[np.ndarray, "time 2"]) -> Float[np.ndarray, "step 2"]:
-    """Return the path until everything rests; the pusher then holds still."""
-    rows = np.minimum(np.arange(SETTLED), len(path) - 1)
-    return path[rows]
 
 
 def _apart(bodies: int) -> Float[np.ndarray, "body 3"]:

@@ -12,16 +12,16 @@ from sainet.models.card import Decay, Terms, TrainingSettings
 from sainet.models.identity import Features
 from sainet.runs.documents import checked
 from sainet.runs.errors import require, unknown_name
+from sainet.scenes.quantities import require_seed
 
 FROM_ENGINE = "engine"  # the name of the start `FromSimulator`
 
 
 def _require_at_least(part: object, least: int, *names: str) -> None:
-    wanted = "at least 1" if least else "0 or more"
     for name in names:
         value = getattr(part, name)
         is_known = isinstance(value, int | float) and math.isfinite(value)
-        require(is_known and value >= least, name, wanted, value)
+        require(is_known and value >= least, name, f"at least {least}", value)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,7 +207,7 @@ class Recipe:
 
     def __post_init__(self) -> None:
         """Refuse impossible settings."""
-        _require_at_least(self, 0, "seed")
+        require_seed(self.seed)
         _require_at_least(self, 1, "log_every", "checkpoint_every")
 
     def changed(self, **settings: object) -> "Recipe":

@@ -13,7 +13,7 @@ from sainet.models.identity import ModelId, ProcessFeatures
 from sainet.runs.documents import read_document
 from sainet.runs.errors import BadCheckpoint
 from sainet.runs.manifest import Manifest
-from sainet.scenes.quantities import TimeStep
+from sainet.scenes.quantities import LARGEST_SEED, TimeStep
 from sainet.scenes.recording import AGREES, CameraOffset
 
 PROCESS = "process.json"
@@ -32,7 +32,7 @@ class ProcessSettings(msgspec.Struct, frozen=True, kw_only=True):
     # those that were allowed.
     choose: bool = False
     iterations: Count = 50  # of the optimiser, at most, for each output
-    seed: Annotated[int, msgspec.Meta(ge=0)] = 0
+    seed: Annotated[int, msgspec.Meta(ge=0, le=LARGEST_SEED)] = 0
     folds: Annotated[int, msgspec.Meta(ge=2)] = 5  # that calibrate its uncertainty
 
     @property

@@ -140,7 +140,8 @@ Size = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]  # of an error or a durati
 MOST_DISKS = 100  # of a scene
 MOST_PUSHES = 10_000_000  # of a dataset
 MOST_STEPS = 100_000  # of a push
-LARGEST_COUNT = 2**63 - 1  # of a seed, in a document
+LARGEST_COUNT = 2**63 - 1  # of a document
+LARGEST_SEED = 2**32 - 1  # JAX and NumPy take 32 bits as one word
 
 
 def require_count(
@@ -152,3 +153,8 @@ def require_count(
     if not low <= int(value) <= high:
         wanted = f"at least {low}" if int(value) < low else f"from {low} to {high}"
         raise BadSetting(name, value, wanted)
+
+
+def require_seed(seed: object) -> None:
+    """Raise `BadSetting` unless a seed is a whole number of 32 bits."""
+    require_count("seed", seed, low=0, high=LARGEST_SEED)

@@ -147,7 +147,9 @@ def cross_validated(
         BadInput: the inputs of a model are the same in all pushes.
     """
     differ = 0 < len(schemes) == len(set(schemes))
-    require(differ, "by", "one or more different divisions", " ".join(schemes))
+    require(
+        differ, "by", "one or more different divisions", " ".join(schemes) or "empty"
+    )
     surfaces = surfaces_of(store)
     parts: list[Step[Measurements]] = []
     unions: list[Condition] = []

@@ -20,7 +20,7 @@ from sainet.control.gym.tables import Tables
 from sainet.control.gym.task import Observation, PushDisksTask, observation_of
 from sainet.control.trial import make_trial
 from sainet.runs.errors import BadInput, BadSetting, require, require_one_of
-from sainet.scenes.quantities import LARGEST_COUNT, require_count
+from sainet.scenes.quantities import require_count, require_seed
 
 _Mode = gymnasium.vector.AutoresetMode
 _MOST = 1_000_000  # environments
@@ -192,5 +192,5 @@ def _seeds(seed: int | np.integer | Sequence[int], count: int) -> np.ndarray:
     if len(each) != count:
         raise BadInput(f"seed: {len(each)} seeds; give {count}, or one number.")
     for one in each:
-        require_count("seed", one, low=0, high=LARGEST_COUNT)
+        require_seed(one)
     return np.array(each, np.int64)

@@ -6,7 +6,7 @@ from pathlib import Path
 from sainet.control.config import ControlConfig
 from sainet.control.worlds import TableConfig
 from sainet.runs.errors import require
-from sainet.scenes.quantities import LARGEST_COUNT, require_count
+from sainet.scenes.quantities import require_count, require_seed
 from sainet.tasks import Goals
 
 DISK_COUNTS = (2, 3, 4)
@@ -42,7 +42,7 @@ class PlayConfig(TableConfig):
         few = 0 < len(set(self.model)) == len(self.model) <= _MOST_MODELS
         require(few, "model", f"1 to {_MOST_MODELS} different models", self.model)
         require_count("disks", self.disks, low=DISK_COUNTS[0], high=DISK_COUNTS[-1])
-        require_count("seed", self.seed, low=0, high=LARGEST_COUNT)
+        require_seed(self.seed)
         require_count("port", self.port, low=0, high=_LARGEST_PORT)
         require(bool(self.host), "host", "an address of this machine", self.host)
         self.control()
