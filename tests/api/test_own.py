@@ -119,6 +119,13 @@ def test_a_network_is_trained_around_an_own_engine(own, pushes, tmp_path):
         sn.load(out)
 
 
+def test_the_engine_that_is_given_is_used_whatever_was_made_since(own, pushes):
+    name = own.name
+    sn.from_step(lambda scene, state: state, name=name)  # nothing moves
+    network = sn.tune("sain", pushes, engine=own, iterations=1)
+    np.testing.assert_allclose(final(network), final(own), atol=2e-4)
+
+
 def test_a_network_around_another_engine_is_no_start(own, pushes):
     with pytest.raises(BadCheckpoint, match="give `start` another network"):
         sn.tune("sain", pushes, engine=own, start="sain")

@@ -99,6 +99,29 @@ def test_a_file_predicts_only_its_own_pushes(pose, pushes, tmp_path):
         sn.make_planner("tree").plan(some.dynamics, task, scene, scene.in_a_row())
 
 
+def test_rows_of_one_push_with_different_predictions_are_refused(tmp_path):
+    """Disks that differ only in mass have one hash: no row may take another's place."""
+    same = {"radius_mm": (55.0,), "contact_angle_deg": 0.0, "direction_deg": 0.0}
+    config = sn.GenerateConfig(pushes=4, **same, placement_deg=0.0)
+    pushes = sn.generate(config, tmp_path / "same")
+    assert len(set(pushes.hashes)) == 1
+    poses = np.asarray(pushes.batch().truth)[..., :3]
+    np.savez(tmp_path / "theirs.npz", pose=poses, row=np.arange(4))
+    with pytest.raises(BadInput, match="predictions 0 and 1 differ, but are of one"):
+        sn.from_predictions(tmp_path / "theirs.npz", pushes)
+    np.savez(tmp_path / "alike.npz", pose=poses[[0] * 4], row=np.arange(4))
+    assert sn.evaluate([sn.from_predictions(tmp_path / "alike.npz", pushes)], pushes)
+
+
+def test_quoted_names_of_columns_are_read(pose, pushes, tmp_path):
+    path = write(tmp_path, "csv-hash", pose, pushes)
+    header, rest = path.read_text().split("\n", 1)
+    names = ", ".join(f'"{name}"' for name in header.split(",")).replace(", ", " ,")
+    (tmp_path / "quoted.csv").write_text(f"{names}\n{rest}")
+    found = sn.from_predictions(tmp_path / "quoted.csv").dynamics.pose
+    np.testing.assert_array_equal(found, sn.from_predictions(path).dynamics.pose)
+
+
 def test_predictions_of_another_size_are_refused(pose, pushes, tmp_path):
     short = write(tmp_path, "npz", pose[:, :9], pushes)
     with pytest.raises(BadInput, match="predicts 9 steps, the pushes have 40"):

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -90,3 +92,21 @@ def test_background_jobs_keep_ignored_signals():
     with remembered_interrupts():
         os.kill(os.getpid(), signal.SIGINT)
         raise_if_interrupted()
+
+
+def test_ctrl_c_before_a_command_begins_is_one_line():
+    code = (
+        "import signal\nfrom sainet.cli import entry, main\n"
+        "entry.parse = lambda words: signal.raise_signal(signal.SIGINT)\nmain()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == entry.INTERRUPTED
+    assert done.stderr == "sainet: interrupted before it began.\n"
+
+
+def test_ctrl_c_in_a_finaliser_is_not_printed(capsys):
+    with pytest.raises(KeyboardInterrupt), remembered_interrupts():
+        swallow()
+    assert capsys.readouterr().err == ""

@@ -53,6 +53,15 @@ def done(tmp_path_factory):
     return out, run_trials(CONFIG, out)
 
 
+def test_finished_trials_write_nothing(done):
+    """They can be printed again from a folder that is read-only."""
+    out, records = done
+    before = (out / SUMMARY).stat()
+    again = run_trials(CONFIG, out)
+    assert list(map(without_times, again)) == list(map(without_times, records))
+    assert (out / SUMMARY).stat().st_ino == before.st_ino
+
+
 def without_times(record):
     return msgspec.structs.replace(record, decision_s=[])
 

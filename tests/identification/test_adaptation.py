@@ -37,7 +37,7 @@ def executed(scene, push, steps):
     return initial, ENGINE.rollout(one, initial, controls).states
 
 
-def recording_of(scene, angle, heading, trouble="", length=0.01, steps=STEPS):
+def recording_of(scene, angle, heading, *, trouble="", length=0.01, steps=STEPS):
     """A noise-free push of two touching disks with these true properties."""
     push = Push(jnp.float32(angle), jnp.float32(heading), jnp.float32(length))
     initial, states = executed(scene, push, steps)

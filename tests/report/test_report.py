@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from xml.etree import ElementTree
 
@@ -61,6 +62,13 @@ class Page(HTMLParser):
     def handle_data(self, data):
         if self.inside:
             self.scripts[-1] += data
+
+
+def test_a_name_that_is_not_utf_8_does_not_lose_the_page(report, tmp_path):
+    """Python reads a byte that is not UTF-8 in a path as half of a surrogate pair."""
+    strange = replace(report, commands=["sainet demo --out caf\udce9"])
+    text = write_report(strange, tmp_path / "report.html").read_text("utf-8")
+    assert "sainet demo --out caf?" in text
 
 
 def test_one_file_with_everything_in_it(report, tmp_path):

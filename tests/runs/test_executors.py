@@ -100,7 +100,11 @@ def test_a_worker_with_several_threads_is_refused():
         state = State
 
     with pytest.raises(BadInput, match="tcp://1.2.3.4:5 has 2 threads"):
-        executors._prepare({}, Worker)
+        executors._prepare("late", {}, Worker)
+    # Dask only logs the refusal of a worker that comes later.
+    with pytest.raises(BadInput, match="tcp://1.2.3.4:5 has 2 threads"):
+        executors._work_in(os.getcwd(), "late", os.getcwd)
+    assert executors._work_in(os.getcwd(), "other", os.getcwd) == os.getcwd()
 
 
 def test_a_folder_that_a_worker_lacks_is_named(tmp_path):

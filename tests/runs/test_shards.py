@@ -7,7 +7,7 @@ import pytest
 from sainet.runs.documents import write_first, write_json
 from sainet.runs.errors import BadSetting, RunConflict
 from sainet.runs.folders import CONFIG, open_run
-from sainet.runs.manifest import MANIFEST
+from sainet.runs.manifest import MANIFEST, manifest
 from sainet.runs.shards import SHARDS, Shard, collect, open_share
 
 SETTINGS = {"command": "test", "seed": 3}
@@ -134,6 +134,16 @@ def test_settings_that_came_between_are_noticed(tmp_path, monkeypatch):
         write_first(path, value)
 
     monkeypatch.setattr("sainet.runs.documents.write_first", late)
+    with pytest.raises(RunConflict, match="seed is 4, not 3"):
+        open_run(tmp_path, {"seed": 3}, finished_by="end", shared=True)
+
+
+def test_settings_that_came_before_the_manifest_are_noticed(tmp_path, monkeypatch):
+    def late(devices):
+        write_first(tmp_path / CONFIG, {"seed": 4})  # by the other one
+        return manifest(devices)
+
+    monkeypatch.setattr("sainet.runs.folders.manifest", late)
     with pytest.raises(RunConflict, match="seed is 4, not 3"):
         open_run(tmp_path, {"seed": 3}, finished_by="end", shared=True)
 

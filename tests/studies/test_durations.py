@@ -130,10 +130,14 @@ def test_only_finished_steps_with_a_folder_are_not_left(tmp_path):
     clock = Clock(tmp_path)
     worked(clock, pushes, 4)
     worked(clock, half, 4)
+    for step in steps:
+        (tmp_path / step.folder_name).mkdir(parents=True)
     with pytest.raises(KeyboardInterrupt), clock.time(started):
         NOW[0] += 4
         raise KeyboardInterrupt
     assert unfinished(steps, tmp_path) == [half, started]
+    (tmp_path / pushes.folder_name).rmdir()  # as we advise where a file is damaged
+    assert unfinished(steps, tmp_path) == steps
 
 
 @pytest.mark.parametrize(

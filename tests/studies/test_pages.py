@@ -1,7 +1,6 @@
 """Pages of results: rendering them again changes nothing, and no number is typed."""
 
 import re
-import shutil
 
 import pytest
 from msgspec import structs
@@ -12,7 +11,7 @@ from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput
 from sainet.runs.manifest import MANIFEST, manifest
 from sainet.studies import STUDIES, load_study
-from sainet.studies.evidence import Evidence, keep
+from sainet.studies.evidence import Benchmark, Evidence, keep
 from sainet.studies.pages import BEGIN, END, TEMPLATES, rendered, verdict, with_block
 from sainet.studies.study import ENGINE_ERRORS, MEASUREMENTS
 from support import REPOSITORY
@@ -90,7 +89,9 @@ def test_a_page_is_of_its_template_and_its_evidence(tmp_path):
     }
     for name, text in templates.items():
         (tmp_path / TEMPLATES / f"{name}.md.j2").write_text(text)
-    shutil.copy(REPOSITORY / "results" / "bench-training.json", tmp_path / "results")
+    figures: dict[str, float | str | None] = {"devices": 2, "iteration_ms": 91.68}
+    found = Benchmark(figures | {"reason": None}, machine="ours", transcribed=True)
+    write_document(tmp_path / "results" / "bench-training.json", found)
     (tmp_path / "README.md").write_text(f"{BEGIN}{END}")
     pages = {path.name: text for path, text in rendered(tmp_path).items()}
     assert pages["README.md"] == f"{BEGIN}readme-block\n{END}"

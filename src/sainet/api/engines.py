@@ -262,7 +262,7 @@ def register(model: Model) -> None:
     """
     match model:
         case Model(
-            identity=ModelId(simulator=OwnSpec(name=name)),
+            id=ModelId(simulator=OwnSpec(name=name)),
             dynamics=PhysicsDynamics(engine=AssumedProperties(engine=engine)),
         ):
             OWN[name] = engine

@@ -127,7 +127,16 @@ def from_predictions(
     content = _from_csv(path, data) if is_csv else _from_npz(path, data)
     hashes = _hashes(path, content, pushes)
     order = np.argsort(hashes, kind="stable")
-    dynamics = FilePredictions(path, hashes[order], content.pose[order])
+    hashes, pose = hashes[order], content.pose[order]
+    differ = (pose[1:] != pose[:-1]).reshape(len(pose) - 1, -1).any(axis=-1)
+    if len(alike := np.flatnonzero((hashes[1:] == hashes[:-1]) & differ)):
+        rows = " and ".join(map(str, sorted(order[alike[0] :][:2])))
+        raise BadInput(
+            f"{path}: predictions {rows} differ, but are of one push: start and "
+            "command identify it, not masses and frictions. Give a function "
+            "(`from_function`)."
+        )
+    dynamics = FilePredictions(path, hashes, pose)
     return Model(ModelId(kind="physics", name=name or path.stem), dynamics)
 
 

@@ -7,6 +7,9 @@ import sys
 
 def main() -> None:
     """Run the command line; the console script `sainet`."""
+    from sainet.runs.interrupts import end_at_interrupts
+
+    end_at_interrupts()
     # A terminal without a character of ours shows another one in its place.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")

@@ -63,7 +63,9 @@ class Control:
         if (shard := self.machines.share) is not None:
             self.output.say(f"The episodes of shard {shard} are in {self.out}")
             return {"out": str(self.out), "shard": str(shard)}
-        figure = draw_episodes(records[:_DRAWN], self.out / "episodes.svg")
+        figure = self.out / "episodes.svg"
+        if not figure.exists():
+            draw_episodes(records[:_DRAWN], figure)
         if self.animate:
             self._animate(records[:_DRAWN])
         (row,) = trial_rows(measure_trials({model.id: records}))

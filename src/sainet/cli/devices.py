@@ -3,6 +3,7 @@
 import os
 
 from sainet.runs.errors import BadInput
+from sainet.runs.interrupts import interrupts_wait
 from sainet.runs.manifest import use_cache
 from sainet.runs.workers import core_count
 
@@ -25,7 +26,8 @@ def use_devices(count: int | None = None) -> None:
     if count is not None and count < 1:
         raise BadInput(f"--devices is {count}; it must be at least 1.")
     use_cache()
-    import jax
+    with interrupts_wait():
+        import jax
 
     jax.config.update("jax_num_cpu_devices", count or core_count())
 

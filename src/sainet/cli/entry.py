@@ -30,7 +30,11 @@ from sainet.cli.train import Train
 from sainet.cli.tune import Tune
 from sainet.runs.documents import is_full
 from sainet.runs.errors import BadInput, BadTable, SainetError, unknown_name
-from sainet.runs.interrupts import remembered_interrupts
+from sainet.runs.interrupts import (
+    INTERRUPTED,
+    raise_interrupts,
+    remembered_interrupts,
+)
 
 _COMMANDS = {
     "demo": Demo,
@@ -62,7 +66,6 @@ _DESCRIPTION = """Simulator-augmented interaction networks for pushed disks.
 
 Start with 'sainet demo', which runs the whole method at small scale."""
 
-INTERRUPTED = 130
 # Commands that an identical call resumes, if they have a folder.
 _RESUMABLE = (
     *(Demo, Generate, Record, Import, Split, Train, Tune, Control, Reproduce),
@@ -100,6 +103,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     command = None
     try:
         command = parse(words)
+        raise_interrupts()
         with remembered_interrupts():
             finish(command.run(), command.output)
     except SainetError as error:

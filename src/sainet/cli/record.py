@@ -40,4 +40,6 @@ class Record:
             self.output.warn(f"{count} pushes are not in the dataset: {reason}.")
         where = self.out / DATASET
         self.output.say(f"{store.info.pushes} pushes are in {where}")
-        return {"out": str(self.out), "data": str(where), **msgspec.to_builtins(found)}
+        counts = msgspec.to_builtins(found)
+        del counts["seal"]
+        return {"out": str(self.out), "data": str(where), **counts}

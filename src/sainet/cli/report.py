@@ -25,6 +25,6 @@ class MakeReport:
 
         path = self.folder / REPORT
         if not is_of_demo(self.folder):
-            write_bytes(path, page_of(self.folder).encode())
+            write_bytes(path, page_of(self.folder).encode(errors="replace"))
         self.output.say(f"Open {path} in a browser.")
         return {"report": str(path)}

@@ -90,7 +90,8 @@ def run_trials(
     names = [path.relative_to(out).as_posix() for path in files]
     if shards is not None:
         shards.clear()
-    write_document(folder.path / SUMMARY, Finished(names))
+    if not folder.is_finished:
+        write_document(folder.path / SUMMARY, Finished(names))
     return records
 
 

@@ -106,7 +106,8 @@ def _connected(address: str) -> Any:  # noqa: ANN401
             "its address."
         ) from None
     try:
-        client.register_worker_callbacks(partial(_prepare, dict(code_versions())))
+        prepare = partial(_prepare, client.id, dict(code_versions()))
+        client.register_worker_callbacks(prepare)
     except Exception as error:
         client.close(_CLOSES_IN)
         if isinstance(error, SainetError):
@@ -119,9 +120,24 @@ def _connected(address: str) -> Any:  # noqa: ANN401
     return client
 
 
-def _prepare(wanted: Mapping[str, str | None], dask_worker: Any) -> None:  # noqa: ANN401
-    """Prepare a worker, before it imports JAX, or refuse it."""
+def _prepare(
+    client: str,
+    wanted: Mapping[str, str | None],
+    dask_worker: Any,  # noqa: ANN401
+) -> None:
+    """Prepare a worker, before it imports JAX, or refuse it.
+
+    Dask keeps a worker that comes later in spite of an error: its jobs raise it.
+    """
     use_cache()
+    try:
+        _check_worker(wanted, dask_worker)
+    except BadInput as error:
+        _refused[client] = error
+        raise
+
+
+def _check_worker(wanted: Mapping[str, str | None], dask_worker: Any) -> None:  # noqa: ANN401
     name = f"Dask worker {dask_worker.address}"
     if dask_worker.state.nthreads != 1:
         raise BadInput(
@@ -145,6 +161,7 @@ class _Job:
 
 
 _job = _Job()  # one per process: a worker has one thread for jobs
+_refused: dict[str, BadInput] = {}  # why clients cannot use this worker
 
 
 def _end_job(client: str) -> None:
@@ -158,6 +175,8 @@ def _work_in(folder: str, client: str, work: Callable[[], Any]) -> Any:  # noqa:
 
     Relative paths then mean the same files.
     """
+    if client in _refused:
+        raise _refused[client]
     forget_interrupts()
     _job.client = client
     try:

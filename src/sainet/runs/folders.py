@@ -123,7 +123,7 @@ def open_run(
         documents.write_first(path / MANIFEST, made)
     if not (path / CONFIG).exists():
         documents.write_first(path / CONFIG, wanted)
-        _check_free(path, wanted)  # a shard of other settings may have been first
+    _check_free(path, wanted)  # a shard of other settings may have been first
     return folder
 
 

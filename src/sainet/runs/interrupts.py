@@ -5,11 +5,17 @@ collector, and JAX registers such callbacks. Work that takes long calls
 `raise_if_interrupted` at every step, so that it ends all the same.
 """
 
+import os
 import signal
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+INTERRUPTED = 130  # exit status
 
 
 @dataclass
@@ -38,12 +44,52 @@ def remembered_interrupts() -> Iterator[None]:
         yield
         return
     signal.signal(signal.SIGINT, _interrupt)
+    printed = sys.unraisablehook
+    sys.unraisablehook = partial(_unless_interrupted, printed)
     try:
         yield
         raise_if_interrupted()
     finally:
+        sys.unraisablehook = printed
         signal.signal(signal.SIGINT, before)
         _interrupts.have_come = False
+
+
+def _unless_interrupted(printed: Callable[[Any], None], found: Any) -> None:  # noqa: ANN401
+    """Print an exception of a finaliser, but none of Ctrl-C: that is remembered."""
+    if found.exc_type is not KeyboardInterrupt:
+        printed(found)
+
+
+@contextmanager
+def interrupts_wait() -> Iterator[None]:
+    """Only remember Ctrl-C in this context: imports of native code cannot end early.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed in `remembered_interrupts`.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if before is not _interrupt:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda number, frame: remember_interrupt())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    raise_if_interrupted()
+
+
+def end_at_interrupts() -> None:
+    """End this process at Ctrl-C, in one line, while nothing can be lost yet."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
+
+
+def raise_interrupts() -> None:
+    """Raise Ctrl-C as an exception again, after `end_at_interrupts`."""
+    if signal.getsignal(signal.SIGINT) is _end:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def raise_if_interrupted() -> None:
@@ -64,6 +110,11 @@ def remember_interrupt() -> None:
 def forget_interrupts() -> None:
     """Forget what has come; for a job that begins after another one was ended."""
     _interrupts.have_come = False
+
+
+def _end(number: int, frame: object) -> None:
+    os.write(2, b"sainet: interrupted before it began.\n")
+    os._exit(INTERRUPTED)
 
 
 def _interrupt(number: int, frame: object) -> None:

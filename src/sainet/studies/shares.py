@@ -54,7 +54,8 @@ def unfinished(steps: Iterable[Step[Any]], out: Path) -> list[Step[Any]]:
     clock, found = Clock(out), []
     for step in steps:
         took = clock.duration(step)
-        if took is None or not took.has_ended or not step.is_kept:
+        has_ended = took is not None and took.has_ended and step.is_kept
+        if not (has_ended and (out / step.folder_name).is_dir()):
             found.append(step)
     return found
 

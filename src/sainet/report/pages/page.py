@@ -86,7 +86,7 @@ class Report:
 
 def write_report(report: Report, path: Path) -> Path:
     """Write the report atomically and return its path."""
-    write_bytes(path, to_page(report).encode())
+    write_bytes(path, to_page(report).encode(errors="replace"))
     return path
 
 
