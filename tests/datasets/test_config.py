@@ -56,6 +56,7 @@ BAD = [
     ("disks", 1_000_000),
     ("pushes", 10**9),
     ("seed", 10**400),
+    ("seed", 2**32),  # of two words: its chunks would be those of another seed
     ("force_steps", 10**9),
     ("mass_kg", (1e-46,)),  # zero in single precision
     ("radius_mm", (1e300,)),  # infinite in single precision

@@ -30,6 +30,7 @@ NOT_NEGATIVE += ("short_iterations",)
 BAD = [(name, bad) for name in AT_LEAST_ONE for bad in (0, -3)]
 BAD += [(n, bad) for n in ("learning_rate", "clip_norm") for bad in (0.0, -1.0)]
 BAD += [(name, -1) for name in NOT_NEGATIVE]
+BAD += [("seed", 2**32)]
 BAD += [
     (name, bad)
     for name in ("learning_rate", "clip_norm", "l2", "weight_spin")

@@ -139,7 +139,7 @@ def test_shards_give_the_same_numbers(printed, command, tmp_path, capsys):
         (["--shard", "3/2"], "--shard is 3/2; it must be a number and a count"),
         (["--folds", "1"], "folds.*at least 2"),
         (["--by", "chain", "chain"], "--by is chain chain; it must be one or more"),
-        (["--by"], "--by is ; it must be one or more different divisions"),
+        (["--by"], "--by is empty; it must be one or more different divisions"),
         (["--folds", "17"], "32 pushes, 16 of them different by kind.* 17 folds"),
         (["--group", "glass"], "no group 'glass'"),
         (["--pushes", "99"], "32 pushes, not 99"),
