@@ -199,6 +199,10 @@ HOSTILE = {
         "row 14: push '1': the pusher is elsewhere",
     ),
     "jump": (change(100, "x", 0.25), "row 100: push '1': the body jumps"),
+    "jump of the pusher": (
+        to_csv([[*r[:6], r[6] - 0.05 * (r[1] > 0.195), r[7]] for r in rows()]),
+        "row 100: push '1': the pusher jumps",
+    ),
     "jump of the angle": (change(100, "angle", 2.5), "row 100: .*: the angle jumps"),
     "millimetres": (
         each("y", 1000),

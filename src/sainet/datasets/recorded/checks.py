@@ -131,7 +131,8 @@ def _jumps(
 ) -> Iterator[Problem]:
     for body, track in enumerate((*bodies, pusher)):
         what = "the body" if body < len(bodies) else "the pusher"
-        yield from _jump(track.time, distances(track), _MOVE, (what, body))
+        of = min(body, len(bodies) - 1)
+        yield from _jump(track.time, distances(track), _MOVE, (what, of))
     for body, track in enumerate(bodies):
         turned = np.abs(np.diff(track.value[:, 2]))
         yield from _jump(track.time, turned, _TURN, ("the angle", body))
