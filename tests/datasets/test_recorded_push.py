@@ -110,6 +110,11 @@ def test_gaps_are_neither_interpolated_nor_differentiated():
     assert rates.sum() == 240 - (SMOOTHING - 1) - gap.sum() - (SMOOTHING - 1) - 1
 
 
+def test_between_samples_at_the_longest_gap_poses_are_known_despite_rounding():
+    time = np.arange(21) / 10
+    assert np.isfinite(resampled(along(time, time), still(time)).motion[..., :3]).all()
+
+
 def test_steps_after_the_recording_are_unknown():
     time = np.append(clock(0.5), 0.5018)  # 120.43 steps
     assert resampled(along(time, time), still(time)).steps == 120

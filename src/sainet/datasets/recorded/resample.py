@@ -44,7 +44,7 @@ class Track:
         within = (early >= -_SAME_TIME) & (late >= -_SAME_TIME)
         near = min(TIME_STEP, longest_gap) + _SAME_TIME
         beside = np.minimum(np.abs(early), np.abs(late)) <= near
-        return within & (beside | (early + late <= longest_gap))
+        return within & (beside | (early + late <= longest_gap + _SAME_TIME))
 
     def since(self, start: float) -> "Track":
         """Return the same samples on a clock that is zero at a given time (s)."""
