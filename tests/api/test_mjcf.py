@@ -98,6 +98,13 @@ def test_mirrored_pushes_move_disks_mirrored(edited, joints):
     np.testing.assert_allclose(centre[:, 1:], 0.0, atol=1e-3)
 
 
+def test_another_body_may_come_before_the_disks(pucks, edited):
+    box = '<body pos="0.5 0.5 0.02"><freejoint/><geom type="box" size=".02 .02 .02"/>'
+    first = '<body name="disk1"'
+    found = final(sn.from_mjcf(edited(first, f"{box}</body>{first}")))
+    np.testing.assert_allclose(found, final(pucks), atol=1e-3)
+
+
 def test_it_pushes_as_the_planar_engine(pucks):
     identity = sn.load("physics").id
     engine = sn.Model(identity, PhysicsDynamics(PlanarEngine()))

@@ -164,20 +164,20 @@ class Pucks:
         batch = self._batch(models[0], len(models))
         batch.set_models(models)
         place, speed = batch.bind("qpos"), batch.bind("qvel")
-        joint = models[0].joint
+        joint, at, rate = models[0].joint, models[0].jnt_qposadr, models[0].jnt_dofadr
         disks = [[joint(f"{d} {each}").id for each in _JOINTS[:3]] for d in self.disks]
         pusher = [joint(f"pusher {each}").id for each in _JOINTS[:2]]
         substeps = round(time_step / models[0].opt.timestep)
         place[:] = rest
-        place[:, disks], speed[:, disks] = np.split(motion, 2, axis=-1)
+        place[:, at[disks]], speed[:, rate[disks]] = np.split(motion, 2, axis=-1)
         poses = [motion[..., :3]]
         for time in range(path.shape[1] - 1):
             start, way = path[:, time], path[:, time + 1] - path[:, time]
             for part in range(substeps):
-                place[:, pusher] = start + part / substeps * way
-                speed[:, pusher] = way / time_step
+                place[:, at[pusher]] = start + part / substeps * way
+                speed[:, rate[pusher]] = way / time_step
                 batch.step()
-            poses.append(place[:, disks])
+            poses.append(place[:, at[disks]])
         found = np.stack(poses, axis=1)
         rates = np.diff(found, axis=1) / time_step
         return np.concatenate([found[:, 1:], rates], axis=-1, dtype=np.float32)
