@@ -106,6 +106,15 @@ def test_disks_are_at_rest_when_a_recording_ends_and_do_not_creep():
     assert motion.tilt.max() < 1e-3
 
 
+@pytest.mark.parametrize("turned", [np.pi + 0.5, -7.0])
+def test_angles_go_on_from_those_before_a_push(turned):
+    made = LabRobot(draw_lab(0, "abs"), TOUCHING)
+    made._pose[:, 2] = turned
+    made.observe()
+    made.push(push())
+    assert np.abs(made._pose[:, 2] - turned).max() < 0.5
+
+
 def test_several_pushes_at_once_equal_single_pushes():
     lab, rng = draw_lab(2, "abs"), np.random.default_rng(0)
     pose = np.repeat(poses(TOUCHING)[None], 3, 0)

@@ -87,10 +87,10 @@ class Mechanics:
             poses.append(self._pose)
             pushers.append(self._position[:, :_ARM].copy())
             tilt = np.maximum(tilt, self._tilt)
-        found = np.stack(poses, 1)
+        found = np.stack([pose, *poses], 1)
         # Poses between ticks are interpolated, also where the angle passes half a turn.
         found[..., 2] = np.unwrap(found[..., 2], axis=1)
-        return Motion(found, np.stack(pushers, 1), tilt)
+        return Motion(found[:, 1:], np.stack(pushers, 1), tilt)
 
     @property
     def _position(self) -> Float[np.ndarray, "push coordinate"]:
