@@ -35,6 +35,15 @@ def test_obstacles_lie_beside_the_way_and_touch_nothing(trial):
     assert not np.allclose(found, draw_obstacles(4, trial, WAY, ROW, RADIUS))
 
 
+def test_obstacles_that_leave_no_room_for_the_last_are_drawn_again():
+    radius = np.append(RADIUS, 0.055)
+    way = Way(1, ROW[1] + [0.177, 0.0])
+    for trial in range(60):
+        found = np.concatenate([ROW, draw_obstacles(0, trial, way, ROW, radius)])
+        apart = np.linalg.norm(found[:, None] - found, axis=-1) - radius[:, None]
+        assert (apart - radius)[2:, :2].min() >= 0.002
+
+
 def test_too_many_obstacles_are_refused():
     with pytest.raises(BadInput, match="`obstacles` is 20: they have no room"):
         draw_obstacles(0, 0, WAY, ROW, np.full(22, 0.059))
