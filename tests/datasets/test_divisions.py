@@ -4,6 +4,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from learning.stores import info_of, made_up, write
 from sainet.datasets import Scheme
@@ -13,6 +14,7 @@ from sainet.runs.errors import BadStore
 
 PUSHES, FOLDS = 40, 4
 EVERY = np.arange(PUSHES)
+SAME = ("initial_pusher", "command_position", "repeat")
 
 
 def spread(seed=0, around=None):
@@ -54,6 +56,21 @@ def test_blocks_are_ranges_of_equal_size(spread_out, scheme):
         in_order = owner[np.argsort(values[scheme])]
         assert in_order[0] != in_order[-1]
     assert (in_order != np.roll(in_order, 1)).sum() == FOLDS
+
+
+@pytest.mark.parametrize("scheme", ["place", "side"])
+def test_blocks_are_of_the_disk_that_is_pushed(spread_out, tmp_path, scheme):
+    """Which body it is varies: beside it is another that nothing touches."""
+    store, _ = spread_out
+    info, arrays, _ = spread()
+    aside = np.random.default_rng(1).uniform(-0.5, 0.5, (PUSHES, 1, 6))
+    aside[..., 1] += 2.0  # m
+    both = np.concatenate([arrays["initial"], aside], axis=1)
+    both[::2] = both[::2, ::-1]
+    wider = structs.replace(info, bodies=2)
+    arrays = made_up(wider, seed=0) | {k: arrays[k] for k in SAME} | {"initial": both}
+    owner = folds_by(write(tmp_path / "data", wider, arrays), scheme, FOLDS, EVERY)
+    assert (owner == folds_by(store, scheme, FOLDS, EVERY)).all()
 
 
 @pytest.mark.parametrize("scheme", ["direction", "side"])

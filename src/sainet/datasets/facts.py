@@ -121,9 +121,8 @@ def _of_contact(
     radius: Float[np.ndarray, "push body"],
 ) -> Arrays:
     """Return contact angle and direction, from the disk nearest to the pusher."""
-    inward = start[..., :2] - pusher[:, :1]
-    nearest = np.argmin(np.linalg.norm(inward, axis=-1) - radius, axis=1)
-    normal = _angle(inward[np.arange(len(start)), nearest])
+    nearest = nearest_disk(start, pusher[:, 0], radius)
+    normal = _angle(start[np.arange(len(start)), nearest, :2] - pusher[:, 0])
     axis = np.zeros(len(start))
     if start.shape[1] > 1:
         axis = _angle(start[:, 1, :2] - start[:, 0, :2])
@@ -133,6 +132,22 @@ def _of_contact(
         "contact_angle": wrap_angle(normal - axis),
         "direction": wrap_angle(heading - normal),
     }
+
+
+def nearest_disk(
+    start: Float[np.ndarray, "push body _"],
+    pusher: Float[np.ndarray, "push 2"],
+    radius: Float[np.ndarray, "push body"],
+) -> Int[np.ndarray, " push"]:
+    """Return the index of the disk whose rim is nearest to the pusher.
+
+    Args:
+        start: of each disk: x and y (m) first.
+        pusher: its position, m.
+        radius: of each disk, m.
+    """
+    away = np.linalg.norm(start[..., :2] - pusher[:, None], axis=-1)
+    return np.argmin(away - radius, axis=1)
 
 
 def _gap(
