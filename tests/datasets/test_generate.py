@@ -189,6 +189,13 @@ def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines)
     assert not (tmp_path / "out").exists()
 
 
+def test_more_steps_than_a_push_can_have_leave_nothing_behind(tmp_path):
+    config = GenerateConfig(stroke_mm=(1000.0,), speed_mm_s=(0.5,), pushes=1)
+    with pytest.raises(BadInput, match=r"`stroke_mm` is .* `speed_mm_s` higher: 480"):
+        generate(config, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 class LostEngine(PlanarEngine):
     """Predicts NaN."""
 

@@ -254,6 +254,25 @@ def test_hostile_tables_give_one_line_with_the_row_and_leave_nothing(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bodies.toml", "pushes.csv"]
 
 
+def test_what_no_dataset_can_hold_leaves_nothing(tmp_path: Path):
+    grouped = [[*row, "g" * 201] for row in rows()]
+    far = [
+        [*row[:2], f"b{k}", 1 + 0.01 * k, 0, 0, *row[6:]]
+        for k in range(101)
+        for row in rows(rate=30)[::2]
+    ]
+    bodies = "".join(f"[bodies.b{k}]\nmass=1\nradius=0.004\n" for k in range(101))
+    tip = "[pusher]\nradius=0.005\n"
+    for table, header, properties, says in (
+        (grouped, GROUPED, PROPERTIES, "groups.*length <= 200"),
+        (far, HEADER, bodies + tip, "bodies: expected `int` <= 100"),
+    ):
+        paths = write(tmp_path, to_csv(table, header), properties)
+        with pytest.raises(BadInput, match=f"^pushes.csv: {says}"):
+            import_table(*paths, tmp_path / "out")
+        assert not (tmp_path / "out").exists()
+
+
 def test_degrees_of_small_rotations_are_recognised(tmp_path: Path):
     """Ten degrees, given as ten: never beyond twenty, and no sample jumps."""
     table = rows(duration=1.0)

@@ -53,15 +53,16 @@ def add_bystander(
         MissingExtra: an internal engine needs a package that is not installed.
     """
     rng = np.random.default_rng([_STREAM, seed])
+    _check_paths(store)  # before the folder exists
 
     def change(arrays: Arrays) -> Arrays:
-        _check_paths(store, arrays)
         return with_bystander(arrays, store.info, rng, on_pushes)
 
     return derive(store, out, {"bystander_seed": seed}, change)
 
 
-def _check_paths(store: Store, arrays: Arrays) -> None:
+def _check_paths(store: Store) -> None:
+    arrays = store.read(slice(None), ("truth", "truth_pusher", "steps"))
     known = np.isfinite(arrays["truth"]).all((2, 3))
     known &= np.isfinite(arrays["truth_pusher"]).all(2)
     if not (known | ~_lasts(arrays)).all():

@@ -19,7 +19,7 @@ from sainet.engines.simulator import simulator_named
 from sainet.runs.errors import require
 from sainet.runs.shards import Shard
 from sainet.scenes.controls import Controls
-from sainet.scenes.quantities import PROPERTIES
+from sainet.scenes.quantities import MOST_STEPS, PROPERTIES
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, pack_motion
 from sainet.worlds.config import bounds
@@ -100,7 +100,10 @@ def _check_possible(config: GenerateConfig) -> None:
     most = min(engine.most_disks for engine in engines)
     wanted = f"at most {most} with these engines"
     require(config.disks <= most, "disks", wanted, config.disks)
-    for index in range(store_info(config).chunks):
+    info = store_info(config)
+    wanted = f"shorter, or `speed_mm_s` higher: {info.steps} steps exceed {MOST_STEPS}"
+    require(info.steps <= MOST_STEPS, "stroke_mm", wanted, config.stroke_mm)
+    for index in range(info.chunks):
         draw(config, chunk_generator(config.seed, index), config.chunk_size)
 
 

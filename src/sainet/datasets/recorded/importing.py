@@ -15,6 +15,7 @@ from sainet.datasets.store import Store, open_store
 from sainet.datasets.writer import write_once
 from sainet.engines import RECORDED
 from sainet.engines.simulator import simulator_named, stored_simulator
+from sainet.runs.documents import checked
 from sainet.scenes.recording import Conditions
 from sainet.scenes.scene import TIME_STEP
 
@@ -48,10 +49,11 @@ def import_pushes(
     Raises:
         RunConflict: the folder holds something else.
         Diverged: an assumed engine produced NaN or infinity.
-        BadInput: the disk is full.
+        BadInput: the disk is full, or there are too many disks or too long names.
     """
     out, published = Path(out), published or {}
     info = store_info(pushes, engines, tuple(published))
+    checked(info, settings.get("source", out))  # before the folder exists
     repeats = _numbered([push.plan for push in pushes])
 
     def make_chunk(index: int) -> Arrays:
