@@ -210,6 +210,14 @@ def test_a_truth_of_nan_is_refused(tmp_path, monkeypatch):
         generate(small(pushes=7, noise_level="none"), tmp_path / "store")
 
 
+def test_pushes_that_could_not_be_read_again_are_refused(tmp_path):
+    hard = {"force_n": 2000.0, "damping_n_s_m": 0.0, "pushes": 1}
+    says = r"truth.*: push 0: .* it must be from .*; reduce `force_n` or `force_steps`"
+    with pytest.raises(BadInput, match=says):
+        generate(GenerateConfig(setup="direct-force", **hard), tmp_path / "store")
+    assert not (tmp_path / "store" / schema.HASHES).exists()
+
+
 def test_a_missing_engine_leaves_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.setattr("sainet.engines.bullet.engine.find_spec", lambda _: None)
     for engines in ({"engine": "bullet"}, {"assumed_engine": ("planar", "bullet")}):

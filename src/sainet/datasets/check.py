@@ -1,7 +1,7 @@
 """Checks of a dataset: its files when it is opened, its values when they are read."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Literal
 
@@ -200,8 +200,6 @@ def check_values(
 ) -> None:
     """Check that all values of arrays are in their physical ranges.
 
-    NaN stands for values that were not observed; nothing else may be NaN.
-
     Args:
         folder: of the dataset.
         info: of the dataset.
@@ -211,6 +209,26 @@ def check_values(
 
     Raises:
         BadStore: a value is out of range; the message names array, push and value.
+    """
+    for name, reason in out_of_range(info, rows, arrays, read):
+        raise _damaged(folder, f"{ARRAYS}/{name}", reason)
+
+
+def out_of_range(
+    info: StoreInfo,
+    rows: np.ndarray,
+    arrays: Arrays,
+    read: Callable[[str], np.ndarray],
+) -> Iterator[tuple[str, str]]:
+    """Yield arrays with a value out of range: name, and push and value as a reason.
+
+    NaN stands for values that were not observed; nothing else may be NaN.
+
+    Args:
+        info: of the dataset.
+        rows: the numbers of the pushes.
+        arrays: of these pushes.
+        read: returns another array of these pushes.
     """
     known = variables(info)
     published = {published_name(model) for model in info.published}
@@ -225,11 +243,11 @@ def check_values(
         if bad.any():
             place = tuple(np.argwhere(bad)[0])
             quantity = quantities[place[-1] if len(quantities) > 1 else 0]
-            reason = (
+            yield (
+                name,
                 f"push {rows[place[0]]}: {quantity.name} is {values[place]:g}; it must "
-                f"be {quantity.wanted}"
+                f"be {quantity.wanted}",
             )
-            raise _damaged(folder, f"{ARRAYS}/{name}", reason)
 
 
 def _quantities(name: str, variable: Variable, info: StoreInfo) -> tuple[Quantity, ...]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sainet.datasets.batch import check_finite, from_trajectory
+from sainet.datasets.check import out_of_range
 from sainet.datasets.config import GenerateConfig
 from sainet.datasets.schema import Arrays, StoreInfo, simulated_name
 from sainet.datasets.store import Store
@@ -16,17 +17,22 @@ from sainet.datasets.writer import MakeChunk, write_once, write_share
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import simulator_named
-from sainet.runs.errors import require
+from sainet.runs.errors import BadInput, require
 from sainet.runs.shards import Shard
 from sainet.scenes.controls import Controls
 from sainet.scenes.quantities import MOST_STEPS, PROPERTIES
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, pack_motion
-from sainet.worlds.config import bounds
+from sainet.worlds.config import SetupName, bounds
 from sainet.worlds.noise import at_level
 from sainet.worlds.sampling import chunk_generator, draw
 from sainet.worlds.setups import SETUPS
 from sainet.worlds.world import SimulatedWorld
+
+_SLOWER: Mapping[SetupName, str] = {
+    "robot": "reduce `speed_mm_s` or `hold_steps`",
+    "direct-force": "reduce `force_n` or `force_steps`, or increase `damping_n_s_m`",
+}
 
 
 def generate(
@@ -49,8 +55,8 @@ def generate(
 
     Raises:
         RunConflict: the folder belongs to another run.
-        BadInput: the disk is full, a scene has no room for its disks, or an engine
-            cannot have as many.
+        BadInput: the disk is full, a scene has no room for its disks, an engine cannot
+            have as many, or something moves too far or too fast.
         MissingExtra: an engine needs a package that is not installed.
         Diverged: an engine produced NaN or infinity.
     """
@@ -135,6 +141,7 @@ def simulate_chunk(config: GenerateConfig, index: int) -> Arrays:
 
     Raises:
         Diverged: an engine predicted NaN or infinity.
+        BadInput: a value is out of the range of stored values.
     """
     info = store_info(config)
     part = info.chunk_slice(index)
@@ -171,6 +178,9 @@ def simulate_chunk(config: GenerateConfig, index: int) -> Arrays:
     pushes = info.push_names(part)
     for array, engine in engines.items():
         check_finite(engine, arrays[array], pushes)
+    rows = np.arange(part.start, part.stop)
+    for name, reason in out_of_range(info, rows, arrays, arrays.__getitem__):
+        raise BadInput(f"{name}: {reason}; {_SLOWER[config.setup]}.")
     return arrays
 
 
