@@ -207,6 +207,16 @@ def test_many_environments_draw_no_pictures():
     assert make_many(2, render_mode=None).num_envs == 2
 
 
+def test_a_seed_that_is_refused_loses_nothing():
+    env, other = make().unwrapped, make().unwrapped
+    for each in (env, other):
+        each.reset(seed=1)
+    for seed in (-1, 2**32):
+        with pytest.raises(BadSetting, match="`seed` is "):
+            env.reset(seed=seed)
+    assert_same(env.reset()[0], other.reset()[0])
+
+
 def test_a_policy_takes_a_model_by_name_and_refuses_an_environment():
     code = f"""
 import gymnasium, sainet as sn

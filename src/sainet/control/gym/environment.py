@@ -24,7 +24,7 @@ from sainet.control.gym.task import Observation, PushDisksTask
 from sainet.control.record import poses_of
 from sainet.control.trial import make_trial
 from sainet.runs.errors import require_one_of
-from sainet.scenes.quantities import require_count
+from sainet.scenes.quantities import require_count, require_seed
 
 _RENDER_MODES = ("rgb_array",)
 
@@ -80,7 +80,7 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
                 replaces the goal of the trial.
 
         Raises:
-            BadInput: an option is unknown, or the goal is off the table.
+            BadInput: seed or option cannot be used, or the goal is off the table.
         """
         options = options or {}
         for name in options:
@@ -88,6 +88,8 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
         goal = goal_on_table(options["goal"]) if "goal" in options else None
         wanted = options.get("trial")
         index = None if wanted is None else _trial(wanted)
+        if seed is not None:
+            require_seed(seed)
         super().reset(seed=seed)
         if seed is not None:
             self._seed, self._next = seed, 0
