@@ -333,6 +333,20 @@ def test_many_environments_equal_single_ones(disks):
         assert [values[index] for values in found[3][1:4]] == [0, False, False]
 
 
+def test_many_environments_judge_success_by_the_true_radius():
+    """As single ones do, whatever properties models are given."""
+    options = {"given_properties": "assumed", "noise_level": "none"}
+    env, many = make(**options).unwrapped, make_many(1, **options).unwrapped
+    place = env.reset(seed=0)[0]["achieved_goal"]
+    many.reset(seed=0)
+    # The true radius is 59 mm: 5.9 mm is a tenth.
+    for away, wanted in ((0.00585, True), (0.00595, False)):
+        goal = place + np.float32([0.0, away])
+        many._tables.goal[0] = goal
+        assert env.reset(seed=0, options={"goal": goal})[1]["is_success"] == wanted
+        assert many._infos()["is_success"] == [wanted]
+
+
 def test_trials_may_begin_in_the_step_that_ends_the_one_before():
     options = {"pushes": 2, "noise_level": "none"}
     later = make_many(3, **options)

@@ -126,6 +126,11 @@ class Tables:
         self.measured = self._world.capture(end[:, None])[:, 0]
         return ~(moved > STILL) | inside
 
+    @property
+    def success_radius(self) -> float:
+        """The true distance from the goal that counts as success (m)."""
+        return self.config.tolerance * float(self._scene.radius[self.config.target])
+
     @cached_property
     def _scene(self) -> Scene:
         """One scene with the true masses and radii."""

@@ -43,12 +43,8 @@ class PushDisksTask:
     @property
     def tolerance(self) -> float:
         """The measured distance from the goal that ends an episode (m)."""
-        return self.config.stopping_tolerance * self.success_radius
-
-    @property
-    def success_radius(self) -> float:
-        """The true distance from the goal that counts as success (m)."""
-        return self.config.tolerance * float(self.scene.radius[self.target])
+        within = self.config.tolerance * float(self.scene.radius[self.target])
+        return self.config.stopping_tolerance * within
 
     def towards(self, goal: Float[np.ndarray, "2"]) -> PushToGoal:
         """Return the task of an episode, which ends at the stopping tolerance.

@@ -171,7 +171,7 @@ class PushDisksVector(
         """Return success and distance of the true poses, each with its mask."""
         place = self._tables.pose[:, self.task.target, :2]
         away = distances(place, self._tables.goal)
-        found = {"is_success": away <= self.task.success_radius, "distance": away}
+        found = {"is_success": away <= self._tables.success_radius, "distance": away}
         return _masked(found, np.ones(len(away), bool) if which is None else which)
 
 
