@@ -117,6 +117,25 @@ def test_a_push_without_a_number_is_left_out_of_either_format(tmp_path: Path, fo
     assert store.info.pushes == 1
 
 
+@pytest.mark.parametrize("column", ["push", "body", "group"])
+@pytest.mark.parametrize("empty", [" ", None])
+def test_an_empty_text_costs_only_its_push_in_parquet_too(tmp_path, column, empty):
+    pytest.importorskip("pyarrow")
+    header = [*HEADER, "group"]
+    table = [[*row, "felt"] for push in ("good", "bad") for row in rows(push)]
+    table[-3][header.index(column)] = empty
+    _, bodies = write(tmp_path, "")
+    path = tmp_path / "pushes.parquet"
+    path.write_bytes(to_parquet(table, header))
+    says = f"^{path}: row {len(table) - 2}: {column} is empty; write its name.$"
+    for skip in (False, True) if column == "push" else (False,):
+        with pytest.raises(BadTable, match=says):
+            import_table(path, bodies, tmp_path / "out", skip_bad=skip)
+    if column != "push":
+        store = import_table(path, bodies, tmp_path / "out", skip_bad=True)
+        assert store.info.pushes == 1
+
+
 @pytest.mark.parametrize(
     "characters", range(2, len(",".join(map(str, rows()[-1][:-1]))), 4)
 )

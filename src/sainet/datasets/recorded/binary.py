@@ -43,7 +43,10 @@ def read_parquet(
     reader = _Converter(path, problems)
     names = content.column_names
     texts = [n for n in (*columns.texts, *columns.optional) if n in names]
-    read = {name: reader.texts(name, content.column(name)) for name in texts}
+    read = {
+        name: reader.texts(name, content.column(name), of_push=name != columns.texts[0])
+        for name in texts
+    }
     named = [name for name in columns.numbers if name in names]
     numbers = {name: reader.numbers(name, content.column(name)) for name in named}
     found_texts = {name: text for name, text in read.items() if text}
@@ -116,8 +119,14 @@ class _Converter:
             self._problems.add(f"column {name}", line, of_push=True)
         return np.where(np.isfinite(values), values, np.nan).astype(float)
 
-    def texts(self, name: str, column: Any) -> Texts | None:  # noqa: ANN401
-        """Return a column of texts; None if it has another type or an empty text."""
+    def texts(self, name: str, column: Any, *, of_push: bool) -> Texts | None:  # noqa: ANN401
+        """Return a column of texts; None if it has another type.
+
+        Args:
+            name: of the column.
+            column: of pyarrow.
+            of_push: whether an empty text costs only its push; else None is returned.
+        """
         import pyarrow as pa  # pyright: ignore[reportMissingImports]
 
         try:
@@ -129,17 +138,18 @@ class _Converter:
             kind = column.type
             self._bad(name, f"column {name} contains {kind}, not text; convert it.")
             return None
-        names = [(text or "").strip() for text in texts]
+        names = [*((text or "").strip() for text in texts), ""]  # the last one: null
         codes = column.indices.fill_null(-1).to_numpy(zero_copy_only=False)
-        empty = (codes < 0) | ~np.array([*map(bool, names), False])[codes]
-        if empty.any():
-            row = int(np.argmax(empty)) + 1
-            self._bad(name, f"row {row}: {name} is empty; write its name.")
+        empty = np.flatnonzero(~np.array([*map(bool, names)])[codes])
+        for row in empty:
+            line = f"{self._path}: row {row + 1}: {name} is empty; write its name."
+            self._problems.add(f"empty {name}", line, of_push=of_push)
+        if len(empty) and not of_push:
             return None
         used, first = np.unique(codes, return_index=True)
         order = dict.fromkeys(names[code] for code in used[np.argsort(first)])
         place = {text: index for index, text in enumerate(order)}
-        code = np.array([place.get(text, -1) for text in names], np.int64)[codes]
+        code = np.array([place.get(text, -1) for text in names])[codes]
         return Texts(code, list(order))
 
     def _bad(self, name: str, problem: str) -> None:
