@@ -86,7 +86,10 @@ def test_values_of_another_type_are_refused_too():
 from sainet.datasets.config import GenerateConfig
 from sainet.runs.errors import BadInput, BadSetting
 bad = [("setup", "pull"), ("noise_level", "loud"), ("mass_kg", ()),
-       ("mass_kg", (1.0, 2.0, 3.0))]
+       ("mass_kg", (1.0, 2.0, 3.0)), ("mass_kg", 0.9), ("mass_kg", "0.9"),
+       ("mass_kg", ((1.0,), (1.0, 2.0))), ("stroke_mm", 10), ("gap_mm", "1"),
+       ("gap_mm", None), ("contact_angle_deg", "60"), ("assumed_engine", "planar"),
+       ("assumed_engine", None)]
 for name, value in bad:
     try:
         GenerateConfig(**{name: value})

@@ -41,11 +41,13 @@ class GenerateConfig(WorldConfig):
         super().__post_init__()
         require_one_of("setup", self.setup, get_args(SetupName))
         require_one_of("engine", self.engine, ENGINES)
-        for name in self.assumed_engine:
+        names = vars(self)["assumed_engine"]  # whatever its type
+        wanted = "a tuple of one or more different names"
+        require(isinstance(names, tuple | list), "assumed_engine", wanted, names)
+        for name in names:
             require_one_of("assumed_engine", name, SIMULATORS)
-        different = len(set(self.assumed_engine)) == len(self.assumed_engine) > 0
-        wanted = "one or more different names"
-        require(different, "assumed_engine", wanted, self.assumed_engine)
+        different = len(set(names)) == len(names) > 0
+        require(different, "assumed_engine", wanted, names)
         for name in ("pushes", "chunk_size"):
             require_count(name, getattr(self, name), high=MOST_PUSHES)
         require_seed(self.seed)

@@ -5,6 +5,7 @@ check against these bounds. `Mass` and the other annotated types carry the bound
 msgspec documents; `Quantity.check` applies them to numbers and arrays. Free of JAX.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Annotated
@@ -78,9 +79,13 @@ class Quantity:
 
     def require(self, name: str, values: object) -> None:
         """Raise `BadSetting` unless all values of a setting are in the range."""
-        value = self._first_outside(values)
-        if value is not None:
-            raise BadSetting(name, f"{value:g}", self.wanted)
+        with suppress(ValueError):  # of rows of different lengths
+            if np.asarray(values).dtype.kind in "biuf":
+                value = self._first_outside(values)
+                if value is None:
+                    return
+                raise BadSetting(name, f"{value:g}", self.wanted)
+        raise BadSetting(name, values, f"a number {self.wanted}")
 
     def _first_outside(self, values: object) -> float | None:
         numbers = np.asarray(values, np.float64)

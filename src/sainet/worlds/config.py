@@ -1,7 +1,10 @@
 """Settings of simulated scenes and pushes, free of JAX."""
 
 from dataclasses import dataclass, field
+from numbers import Real
 from typing import Literal, get_args
+
+import numpy as np
 
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes import quantities
@@ -103,7 +106,8 @@ class WorldConfig:
             quantity.require(name, getattr(self, name))
         for name in ("contact_angle_deg", "direction_deg", "placement_deg"):
             value = getattr(self, name)
-            require(0 <= value < _RIGHT_ANGLE, name, "from 0 to below 90", value)
+            is_acute = isinstance(value, Real) and 0 <= float(value) < _RIGHT_ANGLE
+            require(is_acute, name, "a number from 0 to below 90", value)
 
     @property
     def masses(self) -> Range | OfDisks:
@@ -122,6 +126,7 @@ def bounds(values: Range) -> tuple[float, float]:
 
 
 def _check_range(name: str, values: Range, quantity: quantities.Quantity) -> None:
-    require(len(values) in (1, 2), name, "one number or two", values)
     quantity.require(name, values)
+    is_range = np.ndim(values) == 1 and len(values) in (1, 2)
+    require(is_range, name, "a tuple of one number or two", values)
     require(values[0] <= values[-1], name, "a range, low before high", values)
