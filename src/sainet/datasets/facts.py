@@ -90,7 +90,7 @@ def _facts(arrays: Arrays, info: StoreInfo) -> Facts:
         start_overlap=_overlap(pose[:, :1], pusher[:, :1], reach),
         overlap=_overlap(pose[:, 1:], pusher[:, 1:], reach),
         **_of_pusher(pusher, known, info.time_step),
-        **_of_contact(start, pusher, radius),
+        **_of_contact(start, pusher, pushed_disk(arrays)),
         **properties,
     )
 
@@ -118,11 +118,10 @@ def _of_pusher(
 def _of_contact(
     start: Float[np.ndarray, "push body 3"],
     pusher: Float[np.ndarray, "push time 2"],
-    radius: Float[np.ndarray, "push body"],
+    pushed: Float[np.ndarray, "push 6"],
 ) -> Arrays:
     """Return contact angle and direction, from the disk nearest to the pusher."""
-    nearest = nearest_disk(start, pusher[:, 0], radius)
-    normal = _angle(start[np.arange(len(start)), nearest, :2] - pusher[:, 0])
+    normal = _angle(pushed[:, :2] - pusher[:, 0])
     axis = np.zeros(len(start))
     if start.shape[1] > 1:
         axis = _angle(start[:, 1, :2] - start[:, 0, :2])
@@ -134,20 +133,12 @@ def _of_contact(
     }
 
 
-def nearest_disk(
-    start: Float[np.ndarray, "push body _"],
-    pusher: Float[np.ndarray, "push 2"],
-    radius: Float[np.ndarray, "push body"],
-) -> Int[np.ndarray, " push"]:
-    """Return the index of the disk whose rim is nearest to the pusher.
-
-    Args:
-        start: of each disk: x and y (m) first.
-        pusher: its position, m.
-        radius: of each disk, m.
-    """
-    away = np.linalg.norm(start[..., :2] - pusher[:, None], axis=-1)
-    return np.argmin(away - radius, axis=1)
+def pushed_disk(arrays: Arrays) -> Float[np.ndarray, "push 6"]:
+    """Return the motion before the push of the disk nearest to the pusher."""
+    start = arrays["initial"]
+    inward = start[..., :2].astype(float) - arrays["initial_pusher"][:, None]
+    nearest = np.argmin(np.linalg.norm(inward, axis=-1) - arrays["radius"], axis=1)
+    return start[np.arange(len(start)), nearest]
 
 
 def _gap(

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from sainet.datasets import Scheme
 from sainet.datasets.chains import linked
-from sainet.datasets.facts import nearest_disk
+from sainet.datasets.facts import pushed_disk
 from sainet.datasets.schema import Arrays
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
@@ -68,15 +68,14 @@ _KINDS: Mapping[Scheme, Callable[[Store], Int[np.ndarray, " push"]]] = {
 
 def _values(store: Store, scheme: Scheme) -> Float[np.ndarray, " push"]:
     """Return a number for each push; blocks are ranges of it."""
-    names = ("initial", "initial_pusher", "radius", "command_position", "steps")
+    names = ("initial", "radius", "initial_pusher", "command_position", "steps")
     arrays = store.read(slice(None), names)
-    start, pusher = arrays["initial"], arrays["initial_pusher"]
-    disk = start[np.arange(len(start)), nearest_disk(start, pusher, arrays["radius"])]
+    place = pushed_disk(arrays)[:, :2]
     if scheme == "place":
-        return disk[:, :2] @ _longest_axis(disk[:, :2])
+        return place @ _longest_axis(place)
     if scheme == "order":
-        return np.arange(len(disk), dtype=float)
-    angles = _direction(arrays) if scheme == "direction" else _side(disk, pusher)
+        return np.arange(len(place), dtype=float)
+    angles = _direction(arrays) if scheme == "direction" else _side(arrays)
     return _from_widest_gap(angles)
 
 
@@ -100,11 +99,10 @@ def _direction(arrays: Arrays) -> Float[np.ndarray, " push"]:
     return np.arctan2(*(last - start).T[::-1])
 
 
-def _side(
-    disk: Float[np.ndarray, "push 6"], pusher: Float[np.ndarray, "push 2"]
-) -> Float[np.ndarray, " push"]:
+def _side(arrays: Arrays) -> Float[np.ndarray, " push"]:
     """Return where on its circumference the disk is pushed (rad)."""
-    normal = disk[:, :2] - pusher
+    disk = pushed_disk(arrays)
+    normal = disk[:, :2] - arrays["initial_pusher"]
     return np.arctan2(normal[:, 1], normal[:, 0]) - disk[:, 2]
 
 

@@ -44,37 +44,24 @@ def draw_obstacles(
     """
     rng = np.random.default_rng([_STREAM, seed, trial])
     radius = np.asarray(radius, np.float64)
-    for _ in range(_ARRANGEMENTS):
-        found = list(np.asarray(placed, np.float64))
-        while len(found) < len(radius):
-            place = _find_room(rng, way, np.array(found), radius)
-            if place is None:
+    found, failed = list(np.asarray(placed, np.float64)), 0
+    while len(found) < len(radius):
+        own = float(radius[len(found)])
+        reach = float(radius[way.target]) + own
+        for _ in range(_TRIES):
+            place = _beside(rng, found[way.target], way.goal, reach)
+            apart = np.hypot(*(np.array(found) - place).T) - radius[: len(found)] - own
+            if apart.min() >= _CLEAR_MM[0] / 1000:
+                found.append(place)
                 break
-            found.append(place)
-        else:
-            return np.array(found[len(placed) :])
-    raise BadInput(
-        f"`obstacles` is {len(radius) - len(placed)}: they have no room beside the "
-        "way to the goal; give fewer."
-    )
-
-
-def _find_room(
-    rng: np.random.Generator,
-    way: Way,
-    found: Float[np.ndarray, "disk 2"],
-    radius: Float[np.ndarray, " body"],
-) -> Float[np.ndarray, " 2"] | None:
-    """Return a place for the next obstacle, None if no try found room."""
-    own = float(radius[len(found)])
-    for _ in range(_TRIES):
-        place = _beside(
-            rng, found[way.target], way.goal, float(radius[way.target]) + own
-        )
-        apart = np.hypot(*(found - place).T) - radius[: len(found)] - own
-        if apart.min() >= _CLEAR_MM[0] / 1000:
-            return place
-    return None
+        else:  # those before it are in its way: draw all again
+            if (failed := failed + 1) == _ARRANGEMENTS:
+                raise BadInput(
+                    f"`obstacles` is {len(radius) - len(placed)}: they have no room "
+                    "beside the way to the goal; give fewer."
+                )
+            del found[len(placed) :]
+    return np.array(found[len(placed) :])
 
 
 def _beside(
