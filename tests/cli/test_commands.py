@@ -281,9 +281,10 @@ def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):
     assert card["started_from"]
     assert card["recipe"]["l2"] == 1e-3
     words = ("identify", "--data", pushes, "--out", tmp_path / "mine")
-    found = sainet(*words, "--json", "--quiet").stdout
-    estimates = json.loads(found.splitlines()[-1])["estimates"]
+    found = sainet(*words, "--json")
+    estimates = json.loads(found.stdout.splitlines()[-1])["estimates"]
     assert [e["name"] for e in estimates][0] == "pusher_friction"
+    assert f"physics-true {tmp_path / 'mine'} --data TEST" in found.stderr
     error = sainet(*words, "--group", "ice", status=2).stderr
     assert "no group 'ice'; it has none" in error
 

@@ -36,6 +36,6 @@ class Identify:
                 store, self.out, on_try=lambda error: advance(1, f"error {error:.3f}")
             )
         print_estimates(found, self.output.console)
-        places = shlex.join([str(self.out), "--data", str(self.data)])
-        self.output.say(f"Compare: sainet evaluate --model physics-true {places}")
+        words = ("evaluate", "--model", "physics-true", str(self.out), "--data", "TEST")
+        self.output.say(f"Compare on other pushes: sainet {shlex.join(words)}")
         return {"out": str(self.out), **found.to_json()}
