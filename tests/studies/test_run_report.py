@@ -13,7 +13,8 @@ from sainet.report.figures.curves import draw_learning_curve
 from sainet.report.figures.paths import draw_paths
 from sainet.runs.documents import write_document, write_json
 from sainet.runs.errors import BadInput
-from sainet.studies.run_report import page_of, report_of
+from sainet.studies import STUDIES, load_study
+from sainet.studies.run_report import figures_of, page_of, report_of
 from sainet.studies.study import TABLE, Result
 from studies.test_simulated_control import result as control_table
 from support import write_sealed
@@ -45,6 +46,13 @@ def test_errors_episodes_and_figures_come_together(tmp_path):
     page = page_of(tmp_path)
     assert "Prediction errors" in page
     assert "alert" not in page
+
+
+def test_every_figure_of_a_study_has_a_caption(tmp_path):
+    drawn = {name for name in STUDIES if load_study(name).figure}
+    for name in drawn:
+        (tmp_path / f"{name}.svg").touch()
+    assert {path.stem for path, _ in figures_of(tmp_path)} == drawn
 
 
 def test_goals_are_a_table_of_their_own(tmp_path):

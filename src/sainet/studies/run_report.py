@@ -15,11 +15,13 @@ from sainet.runs.documents import read_document, read_json
 from sainet.runs.errors import BadInput
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST
+from sainet.studies import STUDIES
 from sainet.studies.study import TABLE, Result
 
 _EPISODES = 6  # that play
 # The figures that commands leave in their folders, and their captions.
 _FIGURES = {
+    **{name: f"Errors in the study {name}." for name in STUDIES},
     "learning-curve": "The loss while the network learned.",
     "paths": "Predicted paths of one push against the true one.",
     "error-over-time": "Mean position error of each disk over the time of a push.",
