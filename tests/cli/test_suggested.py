@@ -30,6 +30,17 @@ def test_cross_validation_suggests_a_command_for_the_same_pushes(model, group):
         assert (data, command.group) == ((DATA,), group)
 
 
+@pytest.mark.parametrize("model", MODELS[1:])
+def test_each_surface_has_a_folder_of_its_own_whatever_its_name(model):
+    counts = {"abs": 9, "wet/dry; ls $HOME": 9}
+    texts = CrossValidate(data=DATA)._commands(model, counts)
+    for text, ending in zip(texts, ("-abs", "-wet%2Fdry%3B-ls-%24HOME"), strict=True):
+        for part in text.split(" && "):
+            out = parse(shlex.split(part)[1:]).out
+            assert out.parent == Path("runs")
+            assert out.name.endswith(ending)
+
+
 def test_the_report_of_all_studies_names_the_command_that_made_it():
     made = Reproduce(studies=("gaps",), out=Path("my runs"), recorded=DATA, trainings=2)
     again = parse(shlex.split(made._command)[1:])
