@@ -105,7 +105,8 @@ def test_regions_that_hold_clearly_too_few_ends_are_doubted(inside, is_doubted):
                 score=size,
                 over_plain=size,
             )
-        ]
+        ],
+        {"gp": "GP"},
     )
     assert ("fewer than they promise" in sentence) == is_doubted
 
@@ -130,4 +131,4 @@ def test_a_few_regions_that_all_hold_prove_little(held, folds, words):
     if folds:
         data = found.data.assign_coords(fold=("sample", np.array(folds, np.int32)))
         found = replace(found, data=data)
-    assert words in in_words(coverage_of(found))[0]
+    assert words in in_words(coverage_of(found), {"gp": "GP"})[0]

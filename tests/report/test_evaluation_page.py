@@ -142,6 +142,18 @@ def test_the_page_holds_curves_replays_and_regions(store, tmp_path):
     }
 
 
+def test_a_page_names_a_model_by_its_label_alone(store, tmp_path):
+    id = ModelId(kind="gp", features="place")
+    models = [Model(id, Drifting(jnp.float32(0.0), True))]
+    path = tmp_path / "page.html"
+    write_evaluation(models, store, evaluate(models, store), path, command="")
+    text = path.read_text()
+    assert "gp-place" not in text
+    assert f"{id.label}: its 90 % regions hold" in text
+    assert text.count(f">{id.label}</text>") == 2  # in the panel of each disk
+    assert text.count(f'"label": "{id.label}"') == 2  # in each replay
+
+
 def test_recorded_ends_need_no_path(tmp_path):
     info = info_of(len(LENGTHS), engine="recorded", seed=None)
     arrays = end_points_alone(made_up(info, LENGTHS))

@@ -77,6 +77,7 @@ class Evaluate:
         from sainet.evaluation.summary import summarise
         from sainet.evaluation.unlike import unlike_pushes
         from sainet.report.arrange import arrange
+        from sainet.report.palette import labels_of
         from sainet.report.writers import print_table, write_table
 
         store = open_part(self.data, self.group)
@@ -90,7 +91,7 @@ class Evaluate:
         summary = summarise(measured)
         print_table(arrange(summary), self.output.console)
         covered = coverage_of(measured)
-        for sentence in in_words(covered):
+        for sentence in in_words(covered, labels_of(summary.models)):
             self.output.console.print(sentence, markup=False, soft_wrap=True)
         if self.table is not None:
             write_table(arrange(summary), self.table)

@@ -7,7 +7,7 @@ radius of the circle of its area, and distances are scaled likewise. A region of
 size for all pushes, calibrated on the same pushes, stands beside them.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import msgspec
 import numpy as np
@@ -152,22 +152,22 @@ def _cells(found: Coverage) -> list[str]:
     return [*words, str(found.body), str(found.count), *numbers]
 
 
-def in_words(found: Sequence[Coverage]) -> list[str]:
-    """Return a sentence for each coverage."""
-    return [_sentence(each) for each in found]
+def in_words(found: Sequence[Coverage], labels: Mapping[str, str]) -> list[str]:
+    """Return a sentence for each coverage, given the labels of models by slug."""
+    return [_sentence(each, labels[each.model]) for each in found]
 
 
-def _sentence(found: Coverage) -> str:
+def _sentence(found: Coverage, label: str) -> str:
     where = f"{found.condition}: " if found.condition else ""
     what = "final positions" if found.kind == "pos" else "final rotations"
     inside, size, over = found.inside, found.size, found.over_plain
     numbers = (*msgspec.structs.astuple(inside), size.value)
     if None in numbers or over.value is None:
-        return f"{where}{found.model}: too few pushes to judge its 90 % regions"
+        return f"{where}{label}: too few pushes to judge its 90 % regions"
     is_unlike = (inside.high or 0.0) < 100 * CONFIDENCE
     verdict = "; fewer than they promise: do not trust them on such pushes" * is_unlike
     return (
-        f"{where}{found.model}: its 90 % regions hold {inside.value:.0f} % "
+        f"{where}{label}: its 90 % regions hold {inside.value:.0f} % "
         f"[{inside.low:.0f}, {inside.high:.0f}] of the {what} of disk {found.body}; "
         f"half width {size.value:.2f} {UNITS[found.kind]}; interval score "
         f"{over.value:.2f} of that of regions of one size{verdict}"

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.control.record import EpisodeRecord, StepRecord
+from sainet.models.identity import ModelId
 from sainet.report.palette import style_of
 
 
@@ -50,6 +51,7 @@ class Replay:
     radius: tuple[float, ...]  # m, of each disk
     pusher_radius: float  # m
     tracks: dict[str, Track]  # by model, the truth first
+    models: tuple[ModelId, ...] = ()  # give the labels
 
     def __post_init__(self) -> None:
         """Check that there is a reference and that all tracks have one shape."""

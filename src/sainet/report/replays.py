@@ -40,6 +40,7 @@ def build_replay(
         radius=tuple(float(r) for r in arrays["radius"][0]),
         pusher_radius=float(arrays["pusher_radius"][0]),
         tracks=tracks,
+        models=tuple(model.id for model in models),
     )
 
 

@@ -17,6 +17,7 @@ from sainet.evaluation.summary import BASELINE, Summary, summarise
 from sainet.models.identity import ModelId
 from sainet.report.arrange import arrange
 from sainet.report.pages.page import REPORT, Report, write_report
+from sainet.report.palette import labels_of
 from sainet.report.recommending import verdict
 from sainet.report.table import Table
 from sainet.studies.candidates import Candidate
@@ -72,7 +73,8 @@ class Validation:
     def coverage(self) -> list[str]:
         """Whether the regions of Gaussian processes hold, a sentence for each."""
         found = coverage_of(self.measured)
-        return in_words([each for each in found if each.condition in self.folds])
+        found = [each for each in found if each.condition in self.folds]
+        return in_words(found, labels_of(self.measured.header.models))
 
     def to_json(self) -> Mapping[str, object]:
         """Return the JSON object that the command prints."""

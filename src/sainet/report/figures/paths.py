@@ -5,7 +5,7 @@ style during the call), writes SVG or PNG by suffix, atomically, and returns the
 path. Paths have a panel of the whole scene, and a magnified panel for each disk.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import ScaledTranslation
 
+from sainet.models.identity import ModelId
 from sainet.report.episode_frames import Replay, Track
 from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
@@ -38,7 +39,7 @@ def draw_paths(replay: Replay, path: Path) -> Path:
     The first panel shows the whole scene. One panel per disk shows the path of its
     centre on a millimetre scale, with the final errors of each model.
     """
-    styles = styles_of(replay.tracks)
+    styles = styles_of(replay.tracks, replay.models)
     with canvas.house_look():
         figure, panels = _push_panels(replay.body_count, len(styles))
         _draw_scene(panels[0], replay, styles)
@@ -49,7 +50,11 @@ def draw_paths(replay: Replay, path: Path) -> Path:
 
 
 def draw_error_over_time(
-    curves: Mapping[str, Curve], path: Path, *, time_step: float
+    curves: Mapping[str, Curve],
+    path: Path,
+    *,
+    time_step: float,
+    models: Iterable[ModelId] = (),
 ) -> Path:
     """Draw the mean position error over the time of a push, one panel per disk.
 
@@ -57,8 +62,9 @@ def draw_error_over_time(
         curves: by model, the error after each step (mm).
         path: where to write; ``.svg`` or ``.png``.
         time_step: seconds between two steps; the first row is one step in.
+        models: give the labels.
     """
-    styles = styles_of(curves)
+    styles = styles_of(curves, models)
     bodies = next(iter(curves.values())).shape[1]
     with canvas.house_look():
         figure = canvas.new_figure(1.2 + 3.6 * bodies, 3.2)

@@ -15,7 +15,7 @@ from sainet.evaluation.summary import summarise
 from sainet.models.model import Model
 from sainet.report.figures.paths import draw_error_over_time
 from sainet.report.pages.page import Report, write_report
-from sainet.report.palette import styles_of
+from sainet.report.palette import labels_of, styles_of
 from sainet.report.replays import build_replay, error_curves
 from sainet.runs.documents import read_json
 from sainet.runs.folders import CONFIG
@@ -57,11 +57,13 @@ def write_evaluation(
         build_replay(models, store, push, title=title, steps=count)
         for push, title in shown_pushes(models, measured)
     ]
+    labels = labels_of(measured.header.models)
+    regions = in_words(coverage_of(measured), labels)
     with TemporaryDirectory() as folder:
         about = Report(
             title=f"Predictions of {store.path.resolve().name}",
             subtitle=f"Errors of {len(models)} models on {store.info.pushes} pushes",
-            summary="\n\n".join(f"{each}." for each in in_words(coverage_of(measured))),
+            summary="\n\n".join(f"{each}." for each in regions),
             table=summarise(measured),
             figures=list(_figures(models, store, count, Path(folder))),
             replays=replays,
@@ -93,5 +95,6 @@ def _figures(
     if not store.info.is_recorded:
         curves = error_curves(models, store, steps=steps, pushes=_MOST_AVERAGED)
         path = folder / "error-over-time.svg"
-        draw_error_over_time(curves, path, time_step=store.info.time_step)
+        ids, step = [model.id for model in models], store.info.time_step
+        draw_error_over_time(curves, path, time_step=step, models=ids)
         yield path, "Mean position error of each disk over the time of a push."

@@ -135,7 +135,7 @@ def _conclusions(report: Report, table: Table | None) -> Sequence[str]:
 
 def replay_data(replay: Replay) -> dict[str, object]:
     """Return a replay as JSON values for the script of the page (mm, rad, s)."""
-    styles = styles_of(replay.tracks)
+    styles = styles_of(replay.tracks, replay.models)
     reference = replay.reference
     return {
         "title": replay.title,
