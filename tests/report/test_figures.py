@@ -102,6 +102,18 @@ def test_errors_of_a_replay_are_millimetres_and_degrees():
     assert push.final_turn_deg("physics") == pytest.approx([0.9, 0.54])
 
 
+DEUTERANOPIA = (
+    (0.367322, 0.860646, -0.227968),
+    (0.280085, 0.672501, 0.047413),
+    (-0.011820, 0.042940, 0.968881),
+)
+PROTANOPIA = (
+    (0.152286, 1.052583, -0.204868),
+    (0.114503, 0.786281, 0.099216),
+    (-0.003882, -0.048116, 1.051998),
+)
+
+
 def test_labels_keep_their_order_and_distance():
     wanted = np.array([5.0, 0.0, 5.5, 0.2, 20.0])
     places = spread(wanted, 2.0)
@@ -136,22 +148,45 @@ def test_lines_differ_without_their_colours():
     assert () not in dashes  # truth, physics and SAIN
 
 
+def rgb(color):
+    return np.array([int(color[start : start + 2], 16) / 255 for start in (1, 3, 5)])
+
+
+def linear(color):
+    return np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+
+
+def seen(color, vision):
+    """In CIELAB, as by the matrices of Machado et al. (2009) for dichromats."""
+    to_xyz = [
+        [0.4339, 0.3762, 0.1899],
+        [0.2127, 0.7152, 0.0722],
+        [0.0178, 0.1095, 0.8727],
+    ]
+    x, y, z = np.cbrt(np.clip(to_xyz @ (vision @ linear(rgb(color))), 1e-6, 1))
+    return np.array([116 * y, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize("vision", [DEUTERANOPIA, PROTANOPIA])
+def test_solid_lines_differ_from_others_on_dark_pages_for_the_colour_blind(vision):
+    colors = {k: v for k, v in css_variables(dark=True).items() if "--model" in k}
+    places = {name: seen(color, np.array(vision)) for name, color in colors.items()}
+    for solid in ("truth", "physics", "sain"):
+        name = style_of(solid).variable
+        others = [place for other, place in places.items() if other != name]
+        assert min(np.linalg.norm(place - places[name]) for place in others) > 9
+
+
 def luminance(color):
     """Of red, green and blue from 0 to 1, as the WCAG has it."""
-    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
-    return linear @ (0.2126, 0.7152, 0.0722)
+    return linear(color) @ (0.2126, 0.7152, 0.0722)
 
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_faint_text_can_be_read(dark):
     (percent,) = re.findall(r"--faint: color-mix.*?(\d+)%", read("report.css"))
     colors = css_variables(dark=dark)
-    ink, paper = (
-        np.array(
-            [int(colors[name][start : start + 2], 16) / 255 for start in (1, 3, 5)]
-        )
-        for name in ("--ink", "--paper")
-    )
+    ink, paper = (rgb(colors[name]) for name in ("--ink", "--paper"))
     faint = paper + int(percent) / 100 * (ink - paper)
     low, high = sorted([luminance(faint), luminance(paper)])
     assert (high + 0.05) / (low + 0.05) >= 4.5  # AA

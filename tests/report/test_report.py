@@ -19,6 +19,7 @@ from sainet.report.pages.page import (
     to_page,
     write_report,
 )
+from sainet.report.palette import style_of
 
 HOSTILE = "</script><script>alert(1)</script>&\"'"
 
@@ -78,6 +79,12 @@ def test_one_file_with_everything_in_it(report, tmp_path):
     for wanted in ("First paragraph.", "sainet demo --out", "0.8.0", "base64,"):
         assert wanted in text
     assert [p.name for p in path.parent.iterdir()] == ["report.html"]
+
+
+def test_tables_and_legends_show_the_dashes_of_lines(report):
+    dash = " ".join(map(str, style_of("in").dash))
+    swatches = to_page(report).count(f'stroke-dasharray="{dash}"')
+    assert dash and swatches == 2  # of the table, of one replay
 
 
 def test_no_reference_leaves_the_file(report):

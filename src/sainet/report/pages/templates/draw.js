@@ -83,13 +83,16 @@ function drawOutline(context, view, pose, radius, look) {
 }
 
 // The path so far, older parts fainter; `placeAt` returns the place at a step.
-function drawTrail(context, view, placeAt, step, color, width) {
-  strokeWith(context, color, width);
+function drawTrail(context, view, placeAt, step, look, width) {
+  strokeWith(context, look.color, width, look.dash);
   for (let piece = 0; piece < TRAIL_PIECES; piece += 1) {
-    const ends = [piece, piece + 1].map((n) => placeAt((step * n) / TRAIL_PIECES));
+    const poses = [piece, piece + 1].map((n) => placeAt((step * n) / TRAIL_PIECES));
+    const [from, to] = poses.map(({ x, y }) => view.at(x, y));
     context.globalAlpha = lerp(0.2, 0.95, (piece + 1) / TRAIL_PIECES);
-    drawLine(context, ...ends.map(({ x, y }) => view.at(x, y)));
+    drawLine(context, from, to);
+    context.lineDashOffset += Math.hypot(to[0] - from[0], to[1] - from[1]) || 0;
   }
+  context.lineDashOffset = 0;
   context.globalAlpha = 1;
 }
 

@@ -83,7 +83,7 @@ class Episode extends Transport {
     context.stroke();
     drawMark(context, this.view, pose, radius, 0.8);
     const placeAt = (step) => poseAt(this.data, body, step);
-    if (this.step > 0) drawTrail(context, this.view, placeAt, this.step, color, 1.5);
+    if (this.step > 0) drawTrail(context, this.view, placeAt, this.step, { color }, 1.5);
     drawDot(context, this.view.at(pose.x, pose.y), 2.5, color);
   }
 

@@ -107,7 +107,7 @@ class Player extends Transport {
     if (!Number.isFinite(pose.x + pose.y)) return;
     if (track === this.truth) drawTrueDisk(context, view, pose, radius, this.ink);
     else drawOutline(context, view, pose, radius, look);
-    drawTrail(context, view, placeAt, this.step, look.color, 1.5);
+    drawTrail(context, view, placeAt, this.step, look, 1.5);
   }
 
   drawLens(canvas, body) {
@@ -122,7 +122,7 @@ class Player extends Transport {
       }
       const { x, y } = placeAt(this.step);
       if (!Number.isFinite(x + y)) return;
-      drawTrail(context, view, placeAt, this.step, look.color, 2);
+      drawTrail(context, view, placeAt, this.step, look, 2);
       drawDot(context, view.at(x, y), 4, look.color);
     });
   }
