@@ -1,6 +1,7 @@
 """The final output of `sainet control`, with fake episodes."""
 
 import shlex
+from pathlib import Path
 
 import pytest
 
@@ -39,12 +40,13 @@ def test_control_prints_its_results(said):
 
 
 def test_the_command_on_the_page_parses():
+    out, given = Path("my runs"), ["--out", "my runs", "--animate"]
     odd = ControlConfig(model="runs/my net; ls", trials=3)
-    words = shlex.split(control._command(odd))
-    assert words[2:] == ["--model", "runs/my net; ls", "--trials", "3", "--animate"]
+    words = shlex.split(control._command(odd, out))
+    assert words[2:] == ["--model", "runs/my net; ls", "--trials", "3", *given]
     swapped = ControlConfig(robot="lab", swapped=True)
-    words = shlex.split(control._command(swapped))
-    assert words[2:] == ["--robot", "lab", "--swapped", "--animate"]
+    words = shlex.split(control._command(swapped, out))
+    assert words[2:] == ["--robot", "lab", "--swapped", *given]
 
 
 @pytest.mark.parametrize(

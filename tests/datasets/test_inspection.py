@@ -1,11 +1,13 @@
 """Inspection: facts by other means, and doubts about pushes that contradict physics."""
 
 import json
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from markupsafe import escape
 from msgspec import structs
 
 from datasets.stores import contents, small
@@ -221,7 +223,7 @@ def test_the_command_prints_and_writes_one_page(tmp_path: Path, capfd):
     arrays["group"] = np.zeros(PUSHES)
     store = stored(tmp_path / "data", arrays, groups=("<script>x",))
     (store.path / "config.json").write_text('{"command": "a test"}')
-    page = tmp_path / "page.html"
+    page = tmp_path / "my page.html"
     before = contents(store.path)
     assert run(["inspect", str(store.path)]) == 0
     text = capfd.readouterr().out
@@ -233,6 +235,7 @@ def test_the_command_prints_and_writes_one_page(tmp_path: Path, capfd):
     assert found["page"] == str(page)
     html = page.read_text()
     assert "moved too far" in html
+    assert escape(shlex.join(["--out", str(page)])) in html
     assert html.count("<svg") == 2
     assert "<script" not in html
     assert "http" not in html.replace("http://www.w3.org/", "").replace(

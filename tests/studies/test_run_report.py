@@ -5,6 +5,7 @@ import shutil
 
 import msgspec
 import pytest
+from markupsafe import escape
 
 from report import samples
 from sainet.control.record import FOLDER
@@ -58,8 +59,10 @@ def test_every_figure_of_a_study_has_a_caption(tmp_path):
 def test_goals_are_a_table_of_their_own(tmp_path):
     row = msgspec.structs.replace(control_table().trials[0], condition="<b>easy</b>")
     summary = msgspec.structs.replace(control_table(), trials=(row,))
-    write_document(tmp_path / TABLE, Result(summary=summary))
-    page = page_of(tmp_path)
+    folder = tmp_path / "my run"
+    write_document(folder / TABLE, Result(summary=summary))
+    page = page_of(folder)
+    assert escape(f"sainet report '{folder}'") in page
     assert "Goals reached" in page
     assert "&lt;b&gt;easy&lt;/b&gt;" in page
     assert "<b>easy" not in page

@@ -135,7 +135,7 @@ class Control:
             subtitle=f"{config.model} plans, {_place(config)}",
             episodes=records,
             manifest=read_json(self.out / MANIFEST),
-            commands=(_command(config),),
+            commands=(_command(config, self.out),),
         )
         page = write_report(report, self.out / "replay.html")
         self.output.say(f"{film} shows the first episode; {page} plays {len(records)}.")
@@ -161,7 +161,7 @@ def _outcome(config: ControlConfig, found: "TrialRow") -> str:
     )
 
 
-def _command(config: ControlConfig) -> str:
+def _command(config: ControlConfig, out: Path) -> str:
     """Return the command that these settings come from."""
     usual = ControlConfig()
     options = [
@@ -173,4 +173,4 @@ def _command(config: ControlConfig) -> str:
             *([] if value is True else [str(value)]),
         )
     ]
-    return shlex.join(["sainet", "control", *options, "--animate"])
+    return shlex.join(["sainet", "control", *options, "--out", str(out), "--animate"])

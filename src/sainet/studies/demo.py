@@ -1,5 +1,6 @@
 """The whole method, small: simulate, train, compare, look."""
 
+import shlex
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -160,7 +161,7 @@ def _draw(
         ),
         replays=(replay,),
         manifest=read_json(out / MANIFEST),
-        commands=("sainet demo",),
+        commands=(shlex.join(["sainet", "demo", "--out", str(out)]),),
     )
 
 

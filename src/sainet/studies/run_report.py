@@ -1,5 +1,6 @@
 """The report of a run folder, for the outputs of any command."""
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,7 @@ def report_of(folder: Path) -> Report:
         figures=figures,
         episodes=episodes,
         manifest=settings | made,
-        commands=(f"sainet report {folder}",),
+        commands=(shlex.join(["sainet", "report", str(folder)]),),
     )
 
 

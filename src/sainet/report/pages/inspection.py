@@ -1,5 +1,6 @@
 """The inspection of a dataset as sentences and as a page."""
 
+import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -73,6 +74,7 @@ def write_inspection(store: Store, facts: Facts, found: Inspection, path: Path) 
     doubtful = [doubt.row for doubt in found.doubts]
     drawn = len(drawn_rows(found.pushes, doubtful))
     part = "All" if drawn == found.pushes else f"{drawn} of {found.pushes}"
+    words = ("sainet", "inspect", str(store.path), "--out", str(path))
     with TemporaryDirectory() as folder:
         table = draw_pushes(facts, doubtful, Path(folder) / "table.svg")
         histograms = Path(folder) / "histograms.svg"
@@ -87,7 +89,7 @@ def write_inspection(store: Store, facts: Facts, found: Inspection, path: Path) 
             ],
             plain_tables=[_doubts(found), _ranges(found)],
             manifest=read_json(store.path / CONFIG),
-            commands=(f"sainet inspect {store.path}",),
+            commands=(shlex.join(words),),
         )
         return write_report(report, path)
 
