@@ -104,7 +104,8 @@ def test_a_table_is_saved_as_its_ending_says(table, tmp_path):
     page = (tmp_path / "a.html").read_text()
     assert page.startswith("<!doctype html>")
     assert "12 pushes" in page
-    assert "net errs by" in page
+    assert page.count("net errs by") == 2  # at the top and below the table
+    assert page.count("net against still") == 1
     with (tmp_path / "a.csv").open() as file:
         assert [row["Model"] for row in csv.DictReader(file)] == [
             *("Physics", "still", "net")
@@ -114,11 +115,13 @@ def test_a_table_is_saved_as_its_ending_says(table, tmp_path):
     assert not (tmp_path / "a.xls").exists()
 
 
-def test_a_notebook_shows_an_escaped_table(pushes):
+def test_a_notebook_shows_an_escaped_table(pushes, tmp_path):
     physics = sn.load("physics")
     table = sn.evaluate({"<b>": physics}, pushes.first(2))
     assert "<b>" not in table._repr_html_()
     assert "&lt;b&gt;" in table._repr_html_()
+    page = table.save(tmp_path / "one.html").read_text()
+    assert "Errors of 1 model on 2 pushes" in page
 
 
 def test_models_are_given_by_name_or_as_objects(pushes):

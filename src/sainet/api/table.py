@@ -114,11 +114,11 @@ class ErrorTable:
         if path.suffix != _PAGE:
             write_table(self.content, path)
             return path
-        pushes = len(self.measured.data["row"])
+        pushes, models = len(self.measured.data["row"]), len(self.summary.models)
         about = Report(
             title=path.stem,
-            subtitle=f"Errors of {len(self.summary.models)} models on {pushes} pushes",
-            summary=self.verdict().replace("\n", "\n\n"),
+            subtitle=f"Errors of {models} model{'s' * (models > 1)} on {pushes} pushes",
+            summary="\n\n".join(self._beside_others()),
             table=self.summary,
         )
         return write_report(about, path)
