@@ -15,6 +15,7 @@ from sainet.models.correctors import Region
 from sainet.models.dynamics import AbstractDynamics
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
+from sainet.report.pages import evaluation as page
 from sainet.report.pages.evaluation import shown_pushes, write_evaluation
 from sainet.report.replays import build_replay, error_curves
 from sainet.scenes.state import Trajectory
@@ -89,8 +90,16 @@ def test_the_page_shows_a_usual_push_and_the_worst_one(store):
     slow, fast = final_errors(store, 0.0), final_errors(store, 0.002)
     assert first.push == np.argsort(slow)[len(slow) // 2]
     assert last.push == np.argmax(fast)
-    assert first.title == f"Push {first.push + 1}: the median final error of slow"
-    assert last.title == f"Push {last.push + 1}: the largest final error of fast"
+    row = f"Push {first.push} (counted from 0)"
+    assert first.title == f"{row}: the median final error of slow"
+    row = f"Push {last.push} (counted from 0)"
+    assert last.title == f"{row}: the largest final error of fast"
+
+
+def test_a_shown_push_is_named_by_its_row_in_the_whole_dataset(store):
+    chosen = store.take(range(2, 7))
+    for push, title in shown_pushes(MODELS, evaluate(MODELS, chosen)):
+        assert title.startswith(f"Push {push + 2} (")
 
 
 def test_a_replay_has_the_steps_and_the_region_of_its_push(store):
@@ -142,6 +151,19 @@ def test_the_page_holds_curves_replays_and_regions(store, tmp_path):
     }
 
 
+@pytest.mark.parametrize(
+    ("most", "part"), [(3, ", in the first 3 pushes."), (len(LENGTHS), ".")]
+)
+def test_the_curves_state_of_which_pushes_they_are(
+    store, tmp_path, most, part, monkeypatch
+):
+    monkeypatch.setattr(page, "_MOST_AVERAGED", most)
+    path = tmp_path / "page.html"
+    measured = evaluate(MODELS, store)
+    page.write_evaluation(MODELS, store, measured, path, command="")
+    assert f"of each disk over the time of a push{part}" in path.read_text()
+
+
 def test_a_page_names_a_model_by_its_label_alone(store, tmp_path):
     id = ModelId(kind="gp", features="place")
     models = [Model(id, Drifting(jnp.float32(0.0), True))]
@@ -162,6 +184,7 @@ def test_recorded_ends_need_no_path(tmp_path):
     path = tmp_path / "page.html"
     write_evaluation(MODELS[:1], store, measured, path, command="")
     text = path.read_text()
+    assert "Errors of 1 model on" in text
     assert "Mean position error of each disk" not in text
     assert "An ellipse is where its model" not in text
     found = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text)

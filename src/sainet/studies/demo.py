@@ -139,7 +139,7 @@ def _draw(
 ) -> Report:
     final = [evaluation.values("final_pos_mm", name) for name in ("sain", "physics")]
     push = typical_push(final[0] / final[1])
-    title = f"Test push {push + 1}"
+    title = f"Test push {push} (counted from 0)"
     replay = build_replay(models, test, push, title=title, steps=PAPER_STEPS)
     curves = error_curves(models, test, steps=PAPER_STEPS, pushes=config.test_pushes)
     paths = draw_paths(replay, out / "paths.svg")

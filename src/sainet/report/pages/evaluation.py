@@ -58,11 +58,12 @@ def write_evaluation(
         for push, title in shown_pushes(models, measured)
     ]
     labels = labels_of(measured.header.models)
+    named = f"{len(models)} model{'s' * (len(models) > 1)}"
     regions = in_words(coverage_of(measured), labels)
     with TemporaryDirectory() as folder:
         about = Report(
             title=f"Predictions of {store.path.resolve().name}",
-            subtitle=f"Errors of {len(models)} models on {store.info.pushes} pushes",
+            subtitle=f"Errors of {named} on {store.info.pushes} pushes",
             summary="\n\n".join(f"{each}." for each in regions),
             table=summarise(measured),
             figures=list(_figures(models, store, count, Path(folder))),
@@ -85,7 +86,8 @@ def shown_pushes(models: Sequence[Model], measured: Measurements) -> Iterator[Sh
         if len(order):
             push = int(order[round(share * (len(order) - 1))])
             label = styles[model.name].label
-            yield Shown(push, f"Push {push + 1}: the {word} final error of {label}")
+            row = f"Push {measured.data['row'].values[push]} (counted from 0)"
+            yield Shown(push, f"{row}: the {word} final error of {label}")
 
 
 def _figures(
@@ -97,4 +99,6 @@ def _figures(
         path = folder / "error-over-time.svg"
         ids, step = [model.id for model in models], store.info.time_step
         draw_error_over_time(curves, path, time_step=step, models=ids)
-        yield path, "Mean position error of each disk over the time of a push."
+        few = f", in the first {_MOST_AVERAGED} pushes"
+        part = few * (store.info.pushes > _MOST_AVERAGED)
+        yield path, f"Mean position error of each disk over the time of a push{part}."
