@@ -146,6 +146,25 @@ def a_refusal_is_shown_and_can_be_closed(page):
     assert is_ready(page)
 
 
+def a_moved_slider_leaves_the_other_values_alone(page):
+    sent = page.execute_async_script(
+        "const [view, done] = arguments;"
+        "import('/panel.js').then(({ Sliders }) => {"
+        "  new Sliders(done).show(view);"
+        "  const input = document.getElementById('mass-1');"
+        "  input.value = 1.2;"
+        "  input.dispatchEvent(new Event('input'));"
+        "  input.dispatchEvent(new Event('change')); });",
+        {
+            "disks": [{"mass_kg": 0.987, "radius_mm": 52.34}],
+            "table_friction": 0.1234,
+            "has_own_properties": True,
+        },
+    )
+    others = {"radius_mm": [52.34], "table_friction": 0.1234}
+    assert sent == {"mass_kg": [1.2], **others}
+
+
 def nothing_is_wider_than_a_phone(page):
     size = {"width": 390, "height": 800, "deviceScaleFactor": 2, "mobile": True}
     page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
@@ -162,3 +181,4 @@ def test_drag_predict_push_plan_and_reload(page):
     a_reload_shows_the_same_world(page)
     a_refusal_is_shown_and_can_be_closed(page)
     nothing_is_wider_than_a_phone(page)
+    a_moved_slider_leaves_the_other_values_alone(page)

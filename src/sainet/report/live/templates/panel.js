@@ -59,7 +59,7 @@ export class Sliders {
     output.htmlFor = id;
     label.append(name, input, output);
     rows.append(label);
-    input.addEventListener("input", () => this.write(input, limit));
+    input.addEventListener("input", () => this.write(input, limit, Number(input.value)));
     input.addEventListener("change", () => this.onChange(this.values()));
   }
 
@@ -70,7 +70,8 @@ export class Sliders {
     this.write(input, limit, value);
   }
 
-  write(input, limit, value = Number(input.value)) {
+  write(input, limit, value) {
+    input.exact = value; // the slider itself holds a multiple of its step
     const text = written(value, limit);
     input.nextElementSibling.textContent = text;
     input.setAttribute("aria-valuetext", text);
@@ -81,9 +82,9 @@ export class Sliders {
   values() {
     const numbers = Array.from({ length: this.count }, (_, index) => index + 1);
     return {
-      mass_kg: numbers.map((disk) => Number(byId(`mass-${disk}`).value)),
-      radius_mm: numbers.map((disk) => Number(byId(`radius-${disk}`).value)),
-      table_friction: Number(byId("table-friction").value),
+      mass_kg: numbers.map((disk) => byId(`mass-${disk}`).exact),
+      radius_mm: numbers.map((disk) => byId(`radius-${disk}`).exact),
+      table_friction: byId("table-friction").exact,
     };
   }
 }
