@@ -16,6 +16,7 @@ MOST_DRAWN = 400  # pushes
 _MM = 1e3
 _BINS = 30
 _COLUMNS = 3
+_ROUNDING = 1e-4  # mm, degrees, ..., or this part of a value; less is no variation
 _DOUBT = "#8a5aa8"
 
 
@@ -91,7 +92,11 @@ def draw_histograms(
         f"{name} ({unit})" if unit else name: values[np.isfinite(values)]
         for name, (unit, values) in quantities.items()
     }
-    varied = {n: v for n, v in finite.items() if len(v) and np.ptp(v) > 0} or finite
+    varied = {
+        name: values
+        for name, values in finite.items()
+        if len(values) and np.ptp(values) > _ROUNDING * abs(values).max(initial=1)
+    } or finite
     rows = -(-len(varied) // _COLUMNS)
     with canvas.house_look():
         figure = canvas.new_figure(7.8, 1.85 * rows)
