@@ -19,6 +19,7 @@ from sainet.datasets.facts import facts_of
 from sainet.datasets.generate import generate
 from sainet.datasets.inspection import inspect, starts_where_another_ends
 from sainet.datasets.store import Store, open_store
+from sainet.report.figures.recordings import draw_histograms
 
 PUSHES, STEPS = 12, 40
 RADIUS, PUSHER = 0.05, 0.005  # m
@@ -62,7 +63,33 @@ def test_facts_are_those_of_the_construction(tmp_path: Path):
         **{"known_steps": STEPS},
     }.items():
         found = getattr(facts, name)
-        np.testing.assert_allclose(found, wanted, atol=1e-6, err_msg=name, rtol=0.03)
+        np.testing.assert_allclose(found, wanted, atol=1e-6, err_msg=name, rtol=1e-3)
+
+
+def test_rounding_is_drawn_as_no_variation(tmp_path: Path):
+    noise = np.array([1.0, 1 + 1e-6])
+    drawn = {"mass": 0.9 * noise, "stroke": 2e4 * noise, "turn": 1e-7 * noise}
+    given = {name: ("", values) for name, values in drawn.items()}
+    given |= {"speed": ("mm/s", np.array([10.0, 10.1]))}
+    text = draw_histograms(given, tmp_path / "a.svg").read_text()
+    assert "speed (mm/s)" in text
+    assert not [name for name in drawn if f">{name}<" in text]
+
+
+@pytest.mark.parametrize("wait", [0, 7])
+def test_the_time_of_a_stroke_is_the_part_in_which_the_pusher_moves(tmp_path, wait):
+    arrays = frictionless_line()
+    share = np.clip((np.arange(1, STEPS + 1) - wait) / 5, 0, 1)
+    arrays["truth_pusher"][..., 0] = arrays["initial_pusher"][:, :1] + STROKE * share
+    facts = facts_of(stored(tmp_path / "data", arrays))
+    np.testing.assert_allclose(facts.duration, 5 / 240, rtol=1e-3)
+
+
+def test_a_pusher_that_rests_has_no_speed(tmp_path: Path):
+    arrays = frictionless_line()
+    arrays["truth_pusher"][:] = arrays["initial_pusher"][:, None]
+    facts = facts_of(stored(tmp_path / "data", arrays))
+    assert (facts.stroke / facts.duration == 0).all()
 
 
 def push_in_place(arrays, push):
