@@ -14,6 +14,8 @@ from sainet.report.episode_frames import Replay, Track
 from sainet.report.figures.canvas import spread
 from sainet.report.figures.curves import draw_learning_curve, running_mean
 from sainet.report.figures.paths import draw_error_over_time, draw_paths
+from sainet.report.live.config import PlayConfig
+from sainet.report.live.page import assets
 from sainet.report.pages import read
 from sainet.report.palette import css_variables, labels_of, style_of, styles_of
 
@@ -182,14 +184,29 @@ def luminance(color):
     return linear(color) @ (0.2126, 0.7152, 0.0722)
 
 
+def contrast(percent, *names, dark):
+    """With the paper, of a mixture of two colours of the palette."""
+    colors = css_variables(dark=dark)
+    one, other, paper = (rgb(colors[name]) for name in (*names, "--paper"))
+    mixed = other + int(percent) / 100 * (one - other)
+    low, high = sorted([luminance(mixed), luminance(paper)])
+    return (high + 0.05) / (low + 0.05)
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_faint_text_can_be_read(dark):
     (percent,) = re.findall(r"--faint: color-mix.*?(\d+)%", read("report.css"))
-    colors = css_variables(dark=dark)
-    ink, paper = (rgb(colors[name]) for name in ("--ink", "--paper"))
-    faint = paper + int(percent) / 100 * (ink - paper)
-    low, high = sorted([luminance(faint), luminance(paper)])
-    assert (high + 0.05) / (low + 0.05) >= 4.5  # AA
+    assert contrast(percent, "--ink", "--paper", dark=dark) >= 4.5  # AA
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_outline_of_the_live_goal_can_be_seen(dark):
+    css = assets(PlayConfig())["/play.css"].body.decode()
+    found = re.findall(
+        r"#goal .reach.*stroke: color-mix\(.*(--.*)\) (\d+)%, var\((.*)\)\);", css
+    )
+    ((one, percent, other),) = found
+    assert contrast(percent, one, other, dark=dark) >= 3  # AA, of graphics
 
 
 def test_a_running_mean_averages_neighbouring_losses(tmp_path):
