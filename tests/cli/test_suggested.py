@@ -34,7 +34,7 @@ def test_cross_validation_suggests_a_command_for_the_same_pushes(model, group):
 def test_each_surface_has_a_folder_of_its_own_whatever_its_name(model):
     counts = {"abs": 9, "wet/dry; ls $HOME": 9}
     texts = CrossValidate(data=DATA)._commands(model, counts)
-    for text, ending in zip(texts, ("-abs", "-wet%2Fdry%3B-ls-%24HOME"), strict=True):
+    for text, ending in zip(texts, ("-abs", "-wet-dry--ls--HOME"), strict=True):
         for part in text.split(" && "):
             out = parse(shlex.split(part)[1:]).out
             assert out.parent == Path("runs")

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
-from urllib.parse import quote
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Bars, Json, Output
@@ -126,7 +125,7 @@ def _part(data: str, group: str | None, pushes: int | None) -> str:
 
 def _command(model: "ModelId", data: str, ending: str) -> str:
     """Return the command that makes a model of all pushes that options choose."""
-    ending = quote(ending.replace(" ", "-"), safe="")  # of the names of folders
+    ending = "".join(c if c.isalnum() else "-" for c in ending)  # of folders
     engine = f"runs/identified{ending}"
     identify = f"sainet identify {data} --out {engine}"
     if model.kind == "physics":

@@ -1,5 +1,6 @@
 """`sainet inspect`."""
 
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -50,6 +51,8 @@ class Inspect:
         lines += [f"and {more} more doubts; a page or --json lists them."] * (more > 0)
         self.output.console.print("\n".join(lines), markup=False, soft_wrap=True)
         if self.out is not None:
-            write_inspection(store, facts, found, self.out)
+            words = ("sainet", "inspect", str(self.data), "--out", str(self.out))
+            command = shlex.join(words)
+            write_inspection(store, facts, found, self.out, command=command)
             self.output.say(f"Open {self.out} in a browser.")
         return to_builtins(found) | {"page": str(self.out) if self.out else None}

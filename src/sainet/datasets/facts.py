@@ -102,7 +102,10 @@ def _of_pusher(
     moves = np.linalg.norm(np.diff(pusher, axis=1), axis=-1)
     stroke = far.max(axis=1)
     # The pusher may wait before and after its stroke.
-    ends = _first_at(far, 0.01 * stroke), _first_at(far, 0.99 * stroke)
+    reached, step = np.maximum.accumulate(far, axis=1), np.arange(far.shape[1])
+    times = [
+        np.interp((0.01 * each[-1], 0.99 * each[-1]), each, step) for each in reached
+    ]
     points = np.linspace(0, pusher.shape[1] - 1, PATH_POINTS).astype(int)
     seen = np.flip(np.maximum.accumulate(np.flip(known, axis=1), axis=1), axis=1)
     return {
@@ -110,19 +113,9 @@ def _of_pusher(
         "stroke": stroke,
         "path_length": moves.sum(axis=1),
         "top_speed": moves.max(axis=1) / time_step,
-        "duration": time_step * np.maximum(np.subtract(*ends[::-1]) / 0.98, 1),
+        "duration": time_step * np.maximum(np.diff(times)[:, 0] / 0.98, 1),
         "unseen": np.where(seen, 0.0, moves).sum(axis=1),
     }
-
-
-def _first_at(
-    far: Float[np.ndarray, "push time"], level: Float[np.ndarray, " push"]
-) -> Float[np.ndarray, " push"]:
-    """Return after how many steps, also parts of one, each distance is at a level."""
-    after = np.maximum((far >= level[:, None]).argmax(axis=1), 1)
-    push = np.arange(len(far))
-    before, gain = far[push, after - 1], np.diff(far, axis=1)[push, after - 1]
-    return after - 1 + (level - before) / np.where(gain > 0, gain, 1)
 
 
 def _of_contact(

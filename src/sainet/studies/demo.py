@@ -1,6 +1,5 @@
 """The whole method, small: simulate, train, compare, look."""
 
-import shlex
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -161,7 +160,7 @@ def _draw(
         ),
         replays=(replay,),
         manifest=read_json(out / MANIFEST),
-        commands=(shlex.join(["sainet", "demo", "--out", str(out)]),),
+        commands=("sainet demo",),
     )
 
 

@@ -72,9 +72,8 @@ class Validation:
     @property
     def coverage(self) -> list[str]:
         """Whether the regions of Gaussian processes hold, a sentence for each."""
-        found = coverage_of(self.measured)
-        found = [each for each in found if each.condition in self.folds]
-        return in_words(found, labels_of(self.measured.header.models))
+        found = [c for c in coverage_of(self.measured) if c.condition in self.folds]
+        return in_words(found, labels_of(self.summary.models))
 
     def to_json(self) -> Mapping[str, object]:
         """Return the JSON object that the command prints."""

@@ -25,6 +25,7 @@ from sainet.report.figures import canvas
 from sainet.report.palette import INK, ModelStyle, styles_of
 
 Curve = Float[np.ndarray, "time body"]  # mm
+Models = Iterable[ModelId]
 _MM = 1e3  # mm in a metre
 _SMALLEST_LENS = 1.0  # mm, the least width that a lens shows
 # Where the panels go (inches): squares whose tops are in line, legends under them.
@@ -50,11 +51,7 @@ def draw_paths(replay: Replay, path: Path) -> Path:
 
 
 def draw_error_over_time(
-    curves: Mapping[str, Curve],
-    path: Path,
-    *,
-    time_step: float,
-    models: Iterable[ModelId] = (),
+    curves: Mapping[str, Curve], path: Path, *, time_step: float, models: Models = ()
 ) -> Path:
     """Draw the mean position error over the time of a push, one panel per disk.
 

@@ -16,7 +16,6 @@ MOST_DRAWN = 400  # pushes
 _MM = 1e3
 _BINS = 30
 _COLUMNS = 3
-_ROUNDING = 1e-4  # mm, degrees, ..., or this part of a value; less is no variation
 _DOUBT = "#8a5aa8"
 
 
@@ -92,10 +91,9 @@ def draw_histograms(
         f"{name} ({unit})" if unit else name: values[np.isfinite(values)]
         for name, (unit, values) in quantities.items()
     }
+    # Less than this tolerance is rounding.
     varied = {
-        name: values
-        for name, values in finite.items()
-        if len(values) and np.ptp(values) > _ROUNDING * abs(values).max(initial=1)
+        n: v for n, v in finite.items() if not np.allclose(v, v[:1], 1e-4, 1e-4)
     } or finite
     rows = -(-len(varied) // _COLUMNS)
     with canvas.house_look():

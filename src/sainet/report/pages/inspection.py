@@ -1,6 +1,5 @@
 """The inspection of a dataset as sentences and as a page."""
 
-import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -59,7 +58,9 @@ def range_cells(found: Range) -> tuple[str, ...]:
     return name, *(f"{round(value, 3):.4g}" for value in values)
 
 
-def write_inspection(store: Store, facts: Facts, found: Inspection, path: Path) -> Path:
+def write_inspection(
+    store: Store, facts: Facts, found: Inspection, path: Path, *, command: str
+) -> Path:
     """Write the page of a dataset atomically and return its path.
 
     Args:
@@ -67,6 +68,7 @@ def write_inspection(store: Store, facts: Facts, found: Inspection, path: Path) 
         facts: of its pushes.
         found: its summary.
         path: of the page.
+        command: that makes the page.
 
     Raises:
         BadInput: the page cannot be written.
@@ -74,7 +76,6 @@ def write_inspection(store: Store, facts: Facts, found: Inspection, path: Path) 
     doubtful = [doubt.row for doubt in found.doubts]
     drawn = len(drawn_rows(found.pushes, doubtful))
     part = "All" if drawn == found.pushes else f"{drawn} of {found.pushes}"
-    words = ("sainet", "inspect", str(store.path), "--out", str(path))
     with TemporaryDirectory() as folder:
         table = draw_pushes(facts, doubtful, Path(folder) / "table.svg")
         histograms = Path(folder) / "histograms.svg"
@@ -89,7 +90,7 @@ def write_inspection(store: Store, facts: Facts, found: Inspection, path: Path) 
             ],
             plain_tables=[_doubts(found), _ranges(found)],
             manifest=read_json(store.path / CONFIG),
-            commands=(shlex.join(words),),
+            commands=(command,),
         )
         return write_report(report, path)
 
