@@ -103,9 +103,7 @@ def _of_pusher(
     stroke = far.max(axis=1)
     # The pusher may wait before and after its stroke.
     reached, step = np.maximum.accumulate(far, axis=1), np.arange(far.shape[1])
-    times = [
-        np.interp((0.01 * each[-1], 0.99 * each[-1]), each, step) for each in reached
-    ]
+    times = [np.interp(np.array((0.01, 0.99)) * r[-1], r, step) for r in reached]
     points = np.linspace(0, pusher.shape[1] - 1, PATH_POINTS).astype(int)
     seen = np.flip(np.maximum.accumulate(np.flip(known, axis=1), axis=1), axis=1)
     return {
