@@ -18,6 +18,7 @@ from sainet.datasets.store import open_store
 from sainet.models.card import read_identified
 from sainet.models.identity import ModelId
 from sainet.models.process_card import read_process_card
+from sainet.report.palette import labels_of
 from sainet.runs.digests import pushes_overlap
 from sainet.runs.errors import BadStore
 from sainet.studies.candidates import ProcessCandidate, candidates_named
@@ -215,7 +216,8 @@ def test_ensembles_and_chosen_processes_are_compared(recorded, tmp_path, monkeyp
     ]
     for slug in found.order[2:]:
         assert np.isfinite(found.measured.values("final_pos_mm", slug)).all()
-        assert any(slug in sentence for sentence in found.coverage)
+        label = labels_of(found.summary.models)[slug]
+        assert any(label in sentence for sentence in found.coverage)
 
 
 def test_candidates_come_from_the_simplest():
