@@ -120,8 +120,9 @@ class Sample:
     def chance(self, other: "Sample") -> Float[np.ndarray, " quantity"]:
         """Return p, two-sided, of differences of the means over the same pushes.
 
-        Twice the share of resamples on the other side of zero, of at least one: below
-        0.05 where the interval of `minus` leaves out zero.
+        Twice the share of resamples on the other side of zero, of at least one: at most
+        about 0.05 where the interval of `minus`, whose ends lie between resamples,
+        leaves out zero.
         """
         value = self.mean - other.mean
         drawn = value + self._widening * (self.drawn() - other.drawn(1) - value)
