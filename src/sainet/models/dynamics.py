@@ -30,7 +30,8 @@ class AbstractDynamics(eqx.Module):
     pusher [push, time, 2]. `from_function` makes dynamics of a function on arrays.
 
     `begin` restarts everything at the state that it is given; `advance` never does,
-    so that two advances equal one long one.
+    so that two advances equal one long one. Contact networks hold their output for
+    some steps (8 by default): only cuts after a multiple of these leave it unchanged.
     """
 
     @property
