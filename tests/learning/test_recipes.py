@@ -101,7 +101,10 @@ def test_unknown_terms_of_the_loss_are_refused():
         checked(msgspec.structs.replace(PAPER.settings(), terms="errors"), "recipe")
 
 
-def test_a_contact_network_keeps_its_hold_when_it_is_tuned_further():
+def test_a_contact_network_keeps_its_hold_and_features_when_it_is_tuned_further():
     start = FromModel("sain-any")
+    assert recipe_for(start, "contact").features == CONTACT.features == "contact"
+    assert recipe_for(start, "contact").start == start
+    assert recipe_for(FromSimulator(), "contact") == CONTACT
     assert recipe_for(start, "contact").horizon.hold == CONTACT.horizon.hold
     assert recipe_for(start).horizon.hold == 1

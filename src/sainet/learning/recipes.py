@@ -295,6 +295,6 @@ def recipe_for(start: Start, features: str | None = None) -> Recipe:
         features: of the network; `contact` has recipes of its own.
     """
     if features == "contact" and not isinstance(start, Fresh):
-        further = FINE_TUNING.changed(hold=CONTACT.horizon.hold, start=start)
-        return CONTACT if isinstance(start, FromSimulator) else further
+        other = FINE_TUNING.changed(features=features, hold=CONTACT.horizon.hold)
+        return replace(other if isinstance(start, FromModel) else CONTACT, start=start)
     return replace(RECIPES[type(start)], start=start)
