@@ -165,6 +165,12 @@ def test_the_greedy_search_stops_after_its_expansions(most):
     assert found.cost <= min(float(FAR.cost(e)) for e in naive_ends(1).values()) + 1e-6
 
 
+def test_a_solution_in_the_last_expansion_completes_the_greedy_search():
+    easy = goal_ahead(0.01, tolerance=1.0)
+    found = GreedyPlanner(actions=FEW, expansions=0).search(problem(easy))
+    assert (len(found.actions), found.evaluated, found.is_complete) == (1, 6, True)
+
+
 def test_an_empty_queue_ends_with_the_best_sequence():
     planner = GreedyPlanner(actions=FEW, same=10.0)  # every state is the first one
     found = planner.search(problem(FAR))

@@ -43,7 +43,7 @@ class GreedyPlanner(AbstractPlanner):
                 return level.found(row, sum(v.evaluated for v in levels))
             levels.append(level.grow(np.array([row]), problem))
             queue.add(levels[-1])
-        return choose(levels, is_complete=False)
+        return choose(levels, is_complete=bool(levels[-1].outcomes.solved.any()))
 
 
 class _Queue:
