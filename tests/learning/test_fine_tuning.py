@@ -23,7 +23,7 @@ from sainet.learning.recipes import (
 from sainet.learning.step import trained_layers
 from sainet.learning.task import Existing, Task
 from sainet.models.card import read_card
-from sainet.models.checkpoint import load_network
+from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.dynamics import predict
 from sainet.models.inputs import push_frame
 from sainet.models.integrators import RelaxingResidual
@@ -382,3 +382,13 @@ def test_an_equal_loss_is_no_improvement(start):
     assert int(best.or_better(network, 0.4, 7).iteration) == 7
     assert [best.is_stale(i, 3) for i in (2, 3)] == [False, True]
     assert not best.is_stale(10_000, 0)
+
+
+@pytest.mark.parametrize("loss", [float("nan"), float("inf")])
+def test_a_first_loss_that_is_not_finite_is_replaced_and_resumed(start, tmp_path, loss):
+    network = load_network(start / "in")[0]
+    best = Best.first(network, loss)
+    assert best.or_better(network, loss, 7) is best
+    assert int(best.or_better(network, 1e6, 7).iteration) == 7
+    save_arrays(tmp_path / "best", best)
+    assert int(load_arrays(tmp_path / "best", best).iteration) == 0

@@ -45,8 +45,12 @@ class Best(eqx.Module):
 
     @staticmethod
     def first(network: AbstractNetwork, loss: float) -> "Best":
-        """Return the network that training begins with: it may remain the best."""
-        return Best(trained_layers(network), jnp.float32(loss), jnp.int32(0))
+        """Return the network that training begins with: it may remain the best.
+
+        A loss that is not finite counts as the largest number, which any other beats.
+        """
+        known = jnp.nan_to_num(jnp.float32(loss), nan=jnp.finfo(jnp.float32).max)
+        return Best(trained_layers(network), known, jnp.int32(0))
 
     def or_better(
         self, network: AbstractNetwork, loss: float, iteration: int
