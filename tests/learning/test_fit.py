@@ -294,6 +294,9 @@ def test_pushes_are_short_in_the_first_iterations(store):
         for iteration, steps in taken.items():
             batch = task.to_training_batch(arrays, most, iteration)
             assert batch.truth.shape[1] == steps
+    beyond = Task("sain", store, recipe.changed(steps=10_000), PLANAR)
+    quarter = store.info.steps // 4
+    assert beyond.to_training_batch(arrays, 40, 1).truth.shape[1] == quarter == 10
 
 
 def test_short_iterations_resume_to_the_same_weights(store, tmp_path):

@@ -112,6 +112,11 @@ class Task:
         share = self.recipe.stopping.validation_share
         return split_rows(self.store.repeats(), share, self.recipe.seed)
 
+    @property
+    def short_steps(self) -> int:
+        """Steps of pushes in the first iterations: a quarter of those trained on."""
+        return -(-min(self.recipe.horizon.steps, self.store.info.steps) // 4)
+
     def complete(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return stored arrays with the simulator prediction that the network takes."""
         return arrays if self.inner is None else self._prediction.complete(arrays)
@@ -124,9 +129,8 @@ class Task:
         self, arrays: dict[str, np.ndarray], steps: int, iteration: int
     ) -> PushBatch:
         """Return the batch of stored arrays for an iteration, some of it mirrored."""
-        horizon = self.recipe.horizon
-        if iteration <= horizon.short_iterations:
-            steps = min(steps, -(-horizon.steps // 4))
+        if iteration <= self.recipe.horizon.short_iterations:
+            steps = min(steps, self.short_steps)
         return self.augmented(self.to_batch(arrays, steps), iteration)
 
     def augmented(self, batch: PushBatch, iteration: int) -> PushBatch:
