@@ -159,6 +159,16 @@ def test_an_identical_call_changes_nothing(folder, store):
     assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()} == before
 
 
+def test_ensembles_of_one_first_member_have_hashes_of_their_own(
+    folder, store, tmp_path
+):
+    fit_ensemble(folder.name, store, RECIPE, tmp_path / "few", members=MEMBERS - 1)
+    first = [load_model(str(member(f, 0))) for f in (folder, tmp_path / "few")]
+    assert first[0].digest == first[1].digest
+    assert load_model(str(folder)).digest == load_model(str(folder)).digest
+    assert load_model(str(folder)).digest != load_model(str(tmp_path / "few")).digest
+
+
 def test_edited_ensembles_are_refused(folder, tmp_path):
     for name, value, message in (
         ("members", ["0" * 64] * MEMBERS, "seal: the file was edited"),

@@ -34,7 +34,7 @@ from sainet.models.dynamics import (
     SimulatorAugmented,
 )
 from sainet.models.ensemble import Ensemble, stacked
-from sainet.models.ensemble_card import is_ensemble, load_ensemble, member
+from sainet.models.ensemble_card import ENSEMBLE, is_ensemble, load_ensemble, member
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessCard, is_process
@@ -110,10 +110,11 @@ def load_model(
     folder = network_folder(name)
     if is_identified(folder):
         return _identified_physics(folder, engine, order)
-    calibration = None
+    calibration = digest = None
     if is_ensemble(folder):
         network, card, found = load_ensemble(folder)
         calibration = found.calibration
+        digest = content_hash(read_file(folder / ENSEMBLE))
     elif is_process(folder):
         from sainet.models.fitted_process import load_process  # slow: scipy.linalg
 
@@ -134,7 +135,7 @@ def load_model(
         dynamics, internal = _restarted(folder, dynamics), None
     dynamics = with_camera(dynamics, card.camera)
     identity = named(card.identity, folder)
-    return Model(identity, dynamics, card, folder, card.weights, internal)
+    return Model(identity, dynamics, card, folder, digest or card.weights, internal)
 
 
 def load_members(folder: Path, count: int) -> tuple[Ensemble, list[Card]]:
