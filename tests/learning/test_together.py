@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from learning.stores import quiet_store
+from learning.stores import info_of, made_up, quiet_store, write
 from sainet.learning import sources as sources_module
 from sainet.learning import together as together_module
 from sainet.learning.fit import fit
@@ -71,6 +71,26 @@ def test_networks_that_train_at_once_are_those_that_train_alone(store, alone, tm
     fit_together(begun(store, tmp_path), lambda done, loss: steps.append(done))
     assert_alike(tmp_path, alone)
     assert sorted(steps) == sorted([*range(1, 13)] * 2)  # those of SAIN, then IN
+
+
+def test_pushes_of_two_lengths_train_at_once(tmp_path):
+    info = info_of(24)
+    arrays = made_up(info, np.where(np.arange(24) % 2, 6, 12))
+    uneven = write(tmp_path / "data", info, arrays)
+    short = RECIPE.changed(batch_size=4)
+    recipes = [short.changed(seed=seed) for seed in range(3)]
+    for number, recipe in enumerate(recipes):
+        fit("in", uneven, recipe, tmp_path / "alone" / str(number))
+    folder = tmp_path / "together"
+    fit_together(
+        [begin("in", uneven, r, folder / str(n)) for n, r in enumerate(recipes)]
+    )
+    for number in map(str, range(3)):
+        found, wanted = (
+            read_log(each / number) for each in (folder, tmp_path / "alone")
+        )
+        for one, two in zip(found, wanted, strict=True):
+            assert one.loss == pytest.approx(two.loss, rel=1e-3)
 
 
 def test_an_interrupted_run_goes_on_together_or_alone(

@@ -8,6 +8,7 @@ from jaxtyping import Array
 
 from sainet.learning.job import Job, finish
 from sainet.learning.mixture import Batches
+from sainet.learning.recipes import Recipe
 from sainet.learning.step import FitState, Side, step_together
 from sainet.runs.errors import Diverged
 from sainet.runs.interrupts import raise_if_interrupted
@@ -56,10 +57,8 @@ class _Member:
     @property
     def form(self) -> tuple[object, ...]:
         """What members have in common that train together."""
-        side, recipe = self.side(self.job.left.start), self.job.recipe
-        shapes = [(x.shape, x.dtype) for x in jax.tree.leaves(side)]
-        settings = recipe.optimiser, recipe.horizon, self.job.left
-        return (*settings, jax.tree.structure(side), tuple(shapes))
+        recipe, form = self.job.recipe, _form(self.side(self.job.left.start))
+        return recipe.optimiser, recipe.horizon, self.job.left, form
 
     def side(self, iteration: int) -> Side:
         """Return the state, and the inputs of an iteration."""
@@ -72,14 +71,31 @@ class _Member:
         self._batches.close()
 
 
+def _form(side: Side) -> object:
+    shapes = [(x.shape, x.dtype) for x in jax.tree.leaves(side)]
+    return jax.tree.structure(side), tuple(shapes)
+
+
+def _step(recipe: Recipe, sides: Sequence[Side]) -> list[tuple[FitState, Array]]:
+    """Return next states and losses; batches of one number of steps go at once."""
+    alike: dict[object, list[int]] = {}
+    for number, side in enumerate(sides):
+        alike.setdefault(_form(side), []).append(number)
+    found: dict[int, tuple[FitState, Array]] = {}
+    for numbers in alike.values():
+        some = tuple(sides[number] for number in numbers)
+        after = step_together(recipe.optimiser, recipe.horizon.hold, some)
+        found |= zip(numbers, after, strict=True)
+    return [found[number] for number in range(len(sides))]
+
+
 def _iterate(
     members: list[_Member], on_step: Callable[[int, float | None], None]
 ) -> None:
     recipe = members[0].job.recipe
     for iteration in members[0].job.left:
         raise_if_interrupted()
-        sides = tuple(member.side(iteration) for member in members)
-        found = step_together(recipe.optimiser, recipe.horizon.hold, sides)
+        found = _step(recipe, [member.side(iteration) for member in members])
         members = list(_noted(members, iteration, found))
         if not members:
             return
