@@ -17,10 +17,12 @@ from sainet.models.dynamics import PhysicsDynamics
 from sainet.models.library import load_model
 from sainet.planning import PLANNERS, make_planner
 from sainet.planning import tree as tree_module
+from sainet.planning.checks import may_lack_room
 from sainet.planning.greedy import GreedyPlanner
 from sainet.planning.levels import (
     Level,
     Problem,
+    choose,
     judge,
     predicted_ends,
     roll_pushes,
@@ -189,6 +191,23 @@ def test_a_deadline_ends_with_the_best_sequence():
     assert plan.is_complete
 
 
+def test_the_nearest_of_equally_short_solutions_is_chosen_over_all_blocks():
+    of_far = problem(FAR)
+    first = of_far.first_level()
+    blocks = [first.grow(np.array([row]), of_far) for row in range(2)]
+
+    def solved(level, distance):
+        ends = level.outcomes._replace(
+            solved=np.ones(6, bool), distance=np.full(6, distance)
+        )
+        return replace(level, outcomes=ends)
+
+    far, near = solved(blocks[0], 0.002), solved(blocks[1], 0.001)
+    found = choose([first, far, near])
+    assert (found.actions, found.distance, found.evaluated) == ((1, 0), 0.001, 18)
+    assert len(choose([solved(first, 0.003), far, near]).actions) == 1
+
+
 def test_a_deadline_expands_the_best_first_pushes(
     monkeypatch,
 ):
@@ -282,6 +301,17 @@ def test_pushes_inside_a_disk_and_their_sequences_are_excluded():
     second = first.grow(np.arange(6), of_chain)
     assert not np.isfinite(second.cost[blocked[second.actions].any(axis=1)]).any()
     assert np.isfinite(second.cost).any()
+
+
+def test_no_pusher_starts_inside_disk_2_where_the_grid_surrounds_disk_1():
+    wide = PushGrid(contact_bins=9, direction_bins=1, contact_range=np.pi)
+    first = Problem(PHYSICS, FAR, SCENE, STATE, wide).first_level()
+    assert not may_lack_room(SCENE, FEW.pushes())
+    angle = np.abs(jax.device_get(wide.pushes().contact_angle))
+    free = np.isfinite(first.cost)
+    assert free[angle < np.pi / 2].all()
+    assert not free[angle > 3].any()
+    assert 5 < free.sum() < 9
 
 
 def test_a_plan_for_a_row_costs_its_distance_and_its_steering():

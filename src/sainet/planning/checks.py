@@ -4,13 +4,14 @@ from collections.abc import Iterator, Sequence
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import Array, Bool
 
 from sainet.models.dynamics import AbstractDynamics
 from sainet.models.push_inputs import untrained
 from sainet.runs.errors import BadScene
-from sainet.scenes.pushes import Push
-from sainet.scenes.scene import Scene, pair_gaps
-from sainet.scenes.state import State, check_state
+from sainet.scenes.pushes import Push, place_pusher
+from sainet.scenes.scene import Scene, pair_gaps, pusher_gaps
+from sainet.scenes.state import State, at_rest, check_state
 
 _DEEPEST_OVERLAP = 5e-3  # m, of measured poses; more cannot be camera noise
 _APART = 5e-3  # m, gap that counts as apart: networks are trained on touching disks
@@ -31,6 +32,22 @@ def check_observation(scene: Scene, state: State) -> float:
             "and the radii."
         )
     return gap
+
+
+def may_lack_room(scene: Scene, pushes: Push) -> bool:
+    """Return whether the pusher may start inside a disk: is `has_room` needed?
+
+    Disk 2 is ahead of disk 1, and never in the way of a pusher behind disk 1.
+    """
+    widest = np.max(np.abs(pushes.contact_angle), initial=0.0)
+    return scene.body_count > (1 if widest > np.pi / 2 else 2)
+
+
+def has_room(scenes: Scene, states: State, pushes: Push) -> Bool[Array, " batch"]:
+    """Return whether the pusher starts outside all disks; all share a batch axis."""
+    start = place_pusher(scenes, states, pushes)
+    initial = at_rest(states.position, states.angle, start)
+    return (pusher_gaps(scenes, initial)[..., 1:] >= 0).all(axis=-1)
 
 
 def doubts(

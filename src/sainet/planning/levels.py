@@ -12,24 +12,19 @@ from jaxtyping import Array, Bool, Float, Int
 
 from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
+from sainet.planning.checks import has_room, may_lack_room
 from sainet.planning.expectation import mean_over
 from sainet.runs.errors import Diverged
-from sainet.scenes.pushes import (
-    Push,
-    PushGrid,
-    command_path,
-    place_pusher,
-    settled_steps,
-)
-from sainet.scenes.scene import Scene, pusher_gaps
+from sainet.scenes.pushes import Push, PushGrid, command_path, settled_steps
+from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, at_rest
 from sainet.tasks.push_to_goal import AbstractTask
 
-_NEVER_IN_THE_WAY = 2  # disks: disk 2 is ahead of disk 1, the pusher behind
 AT_ONCE = 1296  # rows: intermediate arrays of more rows exceed the cache
 _Result = TypeVar("_Result")
-# What all pushes of a call share; each is predicted for so many steps.
-Shared = tuple[AbstractDynamics, AbstractTask, Scene, int]
+# What all pushes of a call share; each is predicted for so many steps. Last, whether a
+# pusher may start inside a disk.
+Shared = tuple[AbstractDynamics, AbstractTask, Scene, int, bool]
 
 
 class Outcomes(NamedTuple):
@@ -66,7 +61,8 @@ def judge(
     Returns:
         The outcomes, ``[push]``, as NumPy arrays.
     """
-    shared = dynamics, task, scene, settled_steps(pushes, scene.time_step)
+    steps = settled_steps(pushes, scene.time_step)
+    shared = dynamics, task, scene, steps, may_lack_room(scene, pushes)
     function = _judge_expected if expected else _judge
     return _of_pushes(function, shared, states, pushes, AT_ONCE)
 
@@ -117,10 +113,10 @@ def batch_of(scene: Scene, count: int) -> Scene:
 
 
 def _judge(shared: Shared, states: State, pushes: Push) -> Outcomes:
-    dynamics, task, scene, steps = shared
+    dynamics, _, scene, steps, _ = shared
     scenes = batch_of(scene, states.angle.shape[0])
     ends = ends_of(dynamics, scenes, states, pushes, steps)
-    return outcomes_of(task, scenes, states, pushes, ends)
+    return outcomes_of(shared, scenes, states, pushes, ends)
 
 
 def ends_of(
@@ -132,19 +128,20 @@ def ends_of(
 
 
 def outcomes_of(
-    task: AbstractTask, scenes: Scene, states: State, pushes: Push, ends: State
+    shared: Shared, scenes: Scene, states: State, pushes: Push, ends: State
 ) -> Outcomes:
     """Return ends of pushes as the task judges them; all share one batch axis."""
+    _, task, *_, is_crowded = shared
     cost, solved = task.cost(ends), task.is_solved(scenes, ends)
-    if scenes.body_count > _NEVER_IN_THE_WAY:
-        free = _has_room(scenes, states, pushes)
+    if is_crowded:
+        free = has_room(scenes, states, pushes)
         cost, solved = jnp.where(free, cost, jnp.inf), solved & free
     return Outcomes(ends, cost, task.distance(ends), solved)
 
 
 def _judge_expected(shared: Shared, states: State, pushes: Push) -> Outcomes:
     """Return the outcomes with the cost and the distance that are expected."""
-    dynamics, task, scene, steps = shared
+    dynamics, task, scene, steps, _ = shared
     found = _judge(shared, states, pushes)
     scenes = batch_of(scene, states.angle.shape[0])
     commanded = command_path(scenes, states, pushes, steps=steps)
@@ -156,13 +153,6 @@ def _judge_expected(shared: Shared, states: State, pushes: Push) -> Outcomes:
         cost=jnp.where(possible, mean_over(region, task.cost, found.state), jnp.inf),
         distance=mean_over(region, task.distance, found.state),
     )
-
-
-def _has_room(scenes: Scene, states: State, pushes: Push) -> Bool[Array, " batch"]:
-    """Return whether the pusher starts outside all disks."""
-    start = place_pusher(scenes, states, pushes)
-    initial = at_rest(states.position, states.angle, start)
-    return (pusher_gaps(scenes, initial)[..., 1:] >= 0).all(axis=-1)
 
 
 _NEAR = 0.010  # m, distance to the goal below which longer sequences are searched
@@ -234,6 +224,11 @@ class Level:
         """The cost at the end of each sequence; infinite where it is NaN."""
         return np.nan_to_num(self.outcomes.cost, nan=np.inf, posinf=np.inf)
 
+    @property
+    def miss(self) -> Float[np.ndarray, " sequence"]:
+        """The distance at the end of each solution (m); infinite for the others."""
+        return np.where(self.outcomes.solved, self.outcomes.distance, np.inf)
+
     def cheapest(self, count: int) -> Int[np.ndarray, " count"]:
         """Return the rows of least cost, in order of cost."""
         return np.argsort(self.cost, kind="stable")[:count]
@@ -277,20 +272,20 @@ class Level:
 def choose(levels: Sequence[Level], *, is_complete: bool = True) -> Found:
     """Return the shortest sequence that solves the task, else that of least cost.
 
+    Of equally short ones, it is the one that ends nearest to the goal.
+
     Args:
-        levels: in order of sequence length.
+        levels: of any sequence lengths.
         is_complete: whether the search ran to its end.
 
     Raises:
         Diverged: no cost is finite.
     """
     evaluated = sum(level.evaluated for level in levels)
-    for level in levels:
-        solved = level.outcomes.solved
-        if solved.any():
-            distance = np.where(solved, level.outcomes.distance, np.inf)
-            nearest = int(np.argmin(distance))
-            return level.found(nearest, evaluated, is_complete=is_complete)
+    if solved := [level for level in levels if level.outcomes.solved.any()]:
+        best = min(solved, key=lambda level: (level.actions.shape[1], level.miss.min()))
+        nearest = int(np.argmin(best.miss))
+        return best.found(nearest, evaluated, is_complete=is_complete)
     best = min(levels, key=lambda level: level.cost.min())
     if not np.isfinite(best.cost.min()):
         raise Diverged(

@@ -16,6 +16,7 @@ from jaxtyping import Array, Float, Int
 
 from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
+from sainet.planning.checks import may_lack_room
 from sainet.planning.levels import (
     AT_ONCE,
     Level,
@@ -74,7 +75,8 @@ class Screen:
         """Return the cost of pushes by the engine and the residuals of first pushes."""
         problem = self.problem
         added = jax.tree.map(lambda x: x[actions], self._residual)
-        shared = engine, problem.task, problem.scene, problem.steps
+        crowded = may_lack_room(problem.scene, problem.pushes)
+        shared = engine, problem.task, problem.scene, problem.steps, crowded
         rows = states, problem.at(actions), added
         return np.asarray(over_devices(_corrected_cost, shared, *rows, most=AT_ONCE))
 
@@ -110,11 +112,11 @@ def _corrected_cost(
     pushes: Push,
     added: Residual,
 ) -> Float[Array, " push"]:
-    engine, task, scene, steps = shared
+    engine, _, scene, steps, _ = shared
     scenes = batch_of(scene, states.angle.shape[0])
     ends = ends_of(engine, scenes, states, pushes, steps)
     moved = rotate(added.position, push_axis(states)[:, None])
     ends = at_rest(
         ends.position + moved, ends.angle + added.angle, ends.pusher_position
     )
-    return outcomes_of(task, scenes, states, pushes, ends).cost
+    return outcomes_of(shared, scenes, states, pushes, ends).cost
