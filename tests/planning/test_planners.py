@@ -28,7 +28,14 @@ from sainet.planning.levels import (
     roll_pushes,
 )
 from sainet.planning.tree import TreePlanner
-from sainet.runs.errors import BadCheckpoint, BadInput, BadScene, Diverged, UnknownName
+from sainet.runs.errors import (
+    BadCheckpoint,
+    BadInput,
+    BadScene,
+    BadSetting,
+    Diverged,
+    UnknownName,
+)
 from sainet.scenes.pushes import PushGrid, settled_steps
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import at_rest
@@ -395,3 +402,15 @@ def test_planners_by_name():
         make_planner("cem")
     with pytest.raises(BadInput, match="`deadline`"):
         make_planner("greedy", deadline=1.0)
+
+
+@pytest.mark.parametrize(
+    ("make", "name", "value"),
+    [(PushGrid, "contact_bins", bad) for bad in (0, -1)]
+    + [(PushGrid, "direction_bins", 0), (TreePlanner, "beam", 0)]
+    + [(TreePlanner, "block", 0), (TreePlanner, "deadline", float("nan"))]
+    + [(GreedyPlanner, "horizon", 0), (GreedyPlanner, "near_horizon", -1)],
+)
+def test_impossible_settings_of_planners_are_refused_by_their_names(make, name, value):
+    with pytest.raises(BadSetting, match=f"^`{name}` is {value}; it must be "):
+        make(**{name: value})

@@ -9,6 +9,7 @@ import numpy as np
 from sainet.planning.base import AbstractPlanner
 from sainet.planning.levels import Found, Level, Problem, choose
 from sainet.scenes.pushes import PushGrid
+from sainet.scenes.quantities import require_count
 
 
 class GreedyPlanner(AbstractPlanner):
@@ -28,6 +29,11 @@ class GreedyPlanner(AbstractPlanner):
     near_horizon: int = eqx.field(static=True, default=3)  # within 10 mm of the goal
     same: float = eqx.field(static=True, default=1e-3)  # m, below which states equal
     expansions: int = eqx.field(static=True, default=12)  # maximum, after the first
+
+    def __check_init__(self) -> None:
+        """Refuse impossible settings."""
+        require_count("horizon", self.horizon)
+        require_count("near_horizon", self.near_horizon)
 
     def search(self, problem: Problem) -> Found:
         """Return the sequence selected by the queue."""

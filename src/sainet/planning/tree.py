@@ -10,7 +10,9 @@ import numpy as np
 from sainet.planning.base import AbstractPlanner
 from sainet.planning.levels import Found, Level, Problem, choose
 from sainet.planning.screening import Screen
+from sainet.runs.errors import require
 from sainet.scenes.pushes import PushGrid
+from sainet.scenes.quantities import require_count
 
 
 class TreePlanner(AbstractPlanner):
@@ -30,6 +32,13 @@ class TreePlanner(AbstractPlanner):
         static=True, default=True
     )  # False: by the model alone
     block: int = eqx.field(static=True, default=12)  # first pushes per deadline check
+
+    def __check_init__(self) -> None:
+        """Refuse impossible settings."""
+        require_count("beam", self.beam)
+        require_count("block", self.block)
+        deadline = 0.0 if self.deadline is None else self.deadline
+        require(not np.isnan(deadline), "deadline", "a number of seconds", deadline)
 
     def search(self, problem: Problem) -> Found:
         """Return the best sequence of one, two or, near the goal, three pushes."""

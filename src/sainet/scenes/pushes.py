@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from sainet.runs.errors import BadScene
 from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.geometry import direction, unit
-from sainet.scenes.quantities import SPEED, STROKE
+from sainet.scenes.quantities import SPEED, STROKE, require_count
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest, floats
 
@@ -84,6 +84,11 @@ class PushGrid(eqx.Module):
     direction_range: float = np.pi / 6
     length: float = 0.010
     speed: float = 0.050
+
+    def __check_init__(self) -> None:
+        """Refuse numbers of angles that are no whole numbers from 1."""
+        require_count("contact_bins", self.contact_bins)
+        require_count("direction_bins", self.direction_bins)
 
     def pushes(self) -> Push:
         """Return all pushes as one batch, the directions running fastest."""
