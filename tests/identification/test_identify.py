@@ -16,6 +16,7 @@ from sainet.datasets.generate import generate
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.planar.engine import PlanarEngine
+from sainet.engines.simulator import BulletSpec
 from sainet.identification import residuals as intervals_module
 from sainet.identification.identify import identify, identify_into
 from sainet.identification.parameters import (
@@ -331,3 +332,9 @@ def test_an_unknown_group_lists_the_available_groups(tmp_path):
     assert store.of_group("abs-20").rows == (3,)
     with pytest.raises(BadInput, match="no group 'ice'; it has abs-10, wood, abs-20"):
         store.of_group("ice")
+
+
+def test_an_engine_without_derivatives_leaves_no_folder(store, tmp_path):
+    with pytest.raises(BadInput, match="bullet, which has no derivatives"):
+        identify_into(store, tmp_path / "out", simulator=BulletSpec())
+    assert not (tmp_path / "out").exists()

@@ -111,6 +111,7 @@ def identify_into(
     if simulator != PLANAR:
         settings["engine"] = to_builtins(simulator)
     check_store(store)
+    _own_engine(simulator)  # raises, before there is a folder
     folder = open_run(out, settings, finished_by=IDENTIFIED)
     if not folder.is_finished:
         write_document(out / IDENTIFIED, identify(store, simulator, on_try=on_try))
