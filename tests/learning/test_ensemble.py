@@ -14,6 +14,7 @@ from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
 from sainet.datasets.batch import to_batch
 from sainet.datasets.splits import split_rows
+from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import coverage_of
 from sainet.evaluation.evaluate import evaluate
 from sainet.learning import ensemble as ensemble_module
@@ -24,7 +25,7 @@ from sainet.learning.recipes import PAPER, SingleSteps
 from sainet.models.dynamics import predict
 from sainet.models.ensemble_card import ENSEMBLE, member
 from sainet.models.library import load_model
-from sainet.runs.errors import BadCheckpoint, BadSetting, BadStore
+from sainet.runs.errors import BadCheckpoint, BadInput, BadSetting, BadStore
 from sainet.scenes.pushes import command_path
 from sainet.scenes.state import pack_motion
 from sainet.studies.run_report import page_of
@@ -155,7 +156,12 @@ def test_members_train_at_once_on_a_gpu(store, folder, tmp_path, monkeypatch):
 
 def test_an_identical_call_changes_nothing(folder, store):
     before = {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
-    fit_ensemble(folder.name, store, RECIPE, folder, members=MEMBERS)
+    told = RECIPE.changed(log_every=2, checkpoint_every=7)
+    planar = InternalEngine(SIMULATORS["planar"])
+    for recipe, engine in ((RECIPE, "planar"), (told, planar)):
+        fit_ensemble(
+            folder.name, store, recipe, folder, members=MEMBERS, assumed_engine=engine
+        )
     assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()} == before
 
 
@@ -200,6 +206,9 @@ def test_impossible_ensembles_are_refused(store, tmp_path):
         fit_ensemble("in", store, single, tmp_path / "b", members=2)
     with pytest.raises(BadStore, match="4 would calibrate"):
         fit_ensemble("in", store.first(20), RECIPE, tmp_path / "c", members=2)
+    with pytest.raises(BadInput, match="`features` is contact"):
+        contact = RECIPE.changed(features="contact")
+        fit_ensemble("sain", store, contact, tmp_path / "d", members=2)
     assert not list(tmp_path.iterdir())
 
 

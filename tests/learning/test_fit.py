@@ -116,8 +116,9 @@ def test_a_swallowed_interrupt_ends_training_before_the_next_iteration(store, tm
 
 def test_other_settings_touch_nothing(trained, store):
     before = contents(trained.folder)
-    for name, changed in (("sain", CONFIG.changed(seed=1)), ("in", CONFIG)):
-        with pytest.raises(RunConflict, match=r"config\.json: (seed|model) is"):
+    other = ("sain", CONFIG.changed(seed=1)), ("in", CONFIG)
+    for name, changed in (*other, ("sain", CONFIG.changed(log_every=4))):
+        with pytest.raises(RunConflict, match=r"json: (seed|model|log_every) is"):
             fit(name, store, changed, trained.folder)
     assert contents(trained.folder) == before
 

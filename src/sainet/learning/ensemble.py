@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
-import msgspec
 import numpy as np
 from jaxtyping import Array, Float, Int
 
@@ -16,7 +15,7 @@ from sainet.datasets.store import Store, last_known
 from sainet.engines.devices import is_one_gpu
 from sainet.engines.simulator import InternalEngine
 from sainet.learning.fit import complete
-from sainet.learning.job import Job, begin
+from sainet.learning.job import Job, begin, prepared
 from sainet.learning.log import read_log
 from sainet.learning.process import quantile, sizes_of
 from sainet.learning.recipes import Recipe, SingleSteps
@@ -69,6 +68,7 @@ def fit_ensemble(
     Raises:
         BadSetting: too few or too many members, or networks of single steps.
         BadStore: the pushes do not suffice to calibrate.
+        BadInput: see `fit`.
         RunConflict: the folder belongs to another run.
     """
     low, high = MEMBERS
@@ -77,13 +77,10 @@ def fit_ensemble(
     if isinstance(recipe.horizon, SingleSteps):
         raise BadSetting("members", members, "left out for networks of single steps")
     rest, held = divided(store, recipe.seed)
-    objective = recipe.objective.for_pushes(len(rest))
-    settings = msgspec.to_builtins(recipe.changed(l2=objective.l2).settings())
-    config = {"command": "train", "model": model, "members": members}
-    config |= {"data": store.content, "engine": msgspec.to_builtins(assumed_engine)}
-    config |= settings
-    folder = open_run(out, config, finished_by=ENSEMBLE)
     training = store.take(np.sort(rest))
+    settings = prepared(model, training, recipe, assumed_engine).settings()
+    config = settings | {"data": store.content, "members": members}
+    folder = open_run(out, config, finished_by=ENSEMBLE)
 
     def job(number: int) -> Job | None:
         own, place = recipe.changed(seed=recipe.seed + number), member(out, number)

@@ -45,10 +45,8 @@ class Best(eqx.Module):
 
     @staticmethod
     def first(network: AbstractNetwork, loss: float) -> "Best":
-        """Return the network that training begins with: it may remain the best.
-
-        A loss that is not finite counts as the largest number, which any other beats.
-        """
+        """Return the network that training begins with: it may remain the best."""
+        # Any loss is better than one that is not finite.
         known = jnp.nan_to_num(jnp.float32(loss), nan=jnp.finfo(jnp.float32).max)
         return Best(trained_layers(network), known, jnp.int32(0))
 
@@ -147,6 +145,33 @@ def begin(
     Returns:
         None if it is finished.
     """
+    mixture = prepared(model, store, recipe, assumed_engine)
+    devices = jax.device_count()
+    folder = open_run(out, mixture.settings(), finished_by=CARD, devices=devices)
+    if folder.is_finished:
+        return None
+    _warn_of_other_machine(folder, devices)
+    state, weights = mixture.begin()
+    is_fresh = mixture.lead.existing is None and not mixture.lead.is_additive
+    drawn_to = None if is_fresh else trained_layers(state.network)
+    validate = mixture.validate(weights)
+    best = Best.first(state.network, validate(state.network)) if validate else None
+    if (out / STATE).is_file():
+        state, best = load_arrays(out / STATE, (state, best))
+    history = rewind_log(out, int(state.iteration))
+    # Match the step's output device: otherwise its second call compiles again.
+    state = jax.device_put(state, jax.devices()[0])
+    progress = Progress(state, best, list(history))
+    return Job(mixture, folder, progress, weights, drawn_to, validate)
+
+
+def prepared(
+    model: ModelKind,
+    store: Store | Sequence[Store],
+    recipe: Recipe,
+    assumed_engine: str | InternalEngine,
+) -> Mixture:
+    """Return what a training run takes, checked; see `fit`."""
     stores = (store,) if isinstance(store, Store) else tuple(store)
     if not stores:
         raise BadInput("`data` is empty; give at least one dataset.")
@@ -158,23 +183,7 @@ def begin(
         tuple(Task(model, each, recipe, assumed, existing) for each in stores)
     )
     mixture.check()
-    devices = jax.device_count()
-    folder = open_run(out, mixture.settings(), finished_by=CARD, devices=devices)
-    if folder.is_finished:
-        return None
-    _warn_of_other_machine(folder, devices)
-    state, weights = mixture.begin()
-    is_fresh = existing is None and not mixture.lead.is_additive
-    drawn_to = None if is_fresh else trained_layers(state.network)
-    validate = mixture.validate(weights)
-    best = Best.first(state.network, validate(state.network)) if validate else None
-    if (out / STATE).is_file():
-        state, best = load_arrays(out / STATE, (state, best))
-    history = rewind_log(out, int(state.iteration))
-    # Match the step's output device: otherwise its second call compiles again.
-    state = jax.device_put(state, jax.devices()[0])
-    progress = Progress(state, best, list(history))
-    return Job(mixture, folder, progress, weights, drawn_to, validate)
+    return mixture
 
 
 def _existing(start: Start) -> Existing | None:

@@ -28,7 +28,6 @@ from sainet.models.identity import ModelKind
 from sainet.models.integrators import Acceleration, Integrator, RelaxingResidual
 
 _STATISTICS_PUSHES = 500  # enough for means and deviations, at any size of store
-_REPORTING = ("log_every", "checkpoint_every")  # settings that do not affect weights
 
 
 @dataclass(frozen=True)
@@ -162,8 +161,9 @@ class Task:
 def settings(task: Task) -> dict[str, object]:
     """Return the settings that decide the weights, as JSON values."""
     recipe = msgspec.to_builtins(task.recipe.settings())
-    for name in _REPORTING:
-        del recipe[name]
+    del recipe["checkpoint_every"]
+    if not task.recipe.stopping.validation_share:  # else each line of the log validates
+        del recipe["log_every"]
     start = {"start": task.existing.card.weights} if task.existing else {}
     start = {"start": FROM_ENGINE} if task.is_additive else start
     return {
