@@ -418,6 +418,21 @@ def test_a_process_without_an_input_is_the_remedy_where_that_never_varies(tmp_pa
     assert not out.exists()
 
 
+@pytest.mark.parametrize(
+    ("seen", "says"), [(2, "2 pushes of at"), (4, "4 pushes that")]
+)
+def test_too_few_known_ends_leave_no_folder(tmp_path, seen, says):
+    info = info_of(12)
+    arrays = made_up(info)
+    arrays["initial_pusher"][:, 1] += np.linspace(-0.02, 0.02, 12)
+    arrays["pose_observed"] &= np.arange(12)[:, None] < seen
+    write_store(tmp_path / "data", info, arrays)
+    store, out = open_store(tmp_path / "data"), tmp_path / "gp"
+    with pytest.raises(BadStore, match=says):
+        fit_process(store, out, PLANAR, ProcessSettings(features="angle"))
+    assert not out.exists()
+
+
 def edited(folder, tmp_path, **changes):
     for name in (PROCESS, ARRAYS):
         (tmp_path / name).write_bytes((folder / name).read_bytes())

@@ -15,7 +15,7 @@ from sainet.datasets.groups import groups_of
 from sainet.datasets.splits import fold_of_push
 from sainet.datasets.store import Store
 from sainet.engines.simulator import InternalEngine
-from sainet.learning.process_ends import Ends, check_inputs, ends_of
+from sainet.learning.process_ends import Ends, ends_of, known_ends
 from sainet.learning.process_fit import fit_to
 from sainet.models.checkpoint import save_arrays
 from sainet.models.correctors import CONFIDENCE, interval_score
@@ -77,7 +77,6 @@ def fit_process(
     if callable(internal):
         internal = internal(out / ENGINE)
     ends = ends_of(store, internal, settings.features)
-    _check_kinds(store.path, ends.kinds, settings.folds)
     best = _best_fit(ends, settings, on_output)
     with jax.enable_x64(True):
         data = save_arrays(out / ARRAYS, best.fitted)
@@ -127,16 +126,11 @@ def check_store(store: Store, settings: ProcessSettings) -> None:
             f"{path}: {info.pushes} pushes; a Gaussian process takes at most {MOST}, "
             "choose some with `pushes`."
         )
-    _check_kinds(path, store.repeats(), settings.folds)
-    check_inputs(store, settings.features)
-
-
-def _check_kinds(path: Path, kinds: Int[np.ndarray, " push"], folds: int) -> None:
-    found = len(np.unique(kinds))
-    if found < folds:
+    found = len(np.unique(known_ends(store, settings.features).kinds))
+    if found < settings.folds:
         raise BadStore(
             f"{path}: {found} pushes that are not repeats of each other and have known "
-            f"ends; the calibration needs at least {folds}."
+            f"ends; the calibration needs at least {settings.folds}."
         )
 
 
