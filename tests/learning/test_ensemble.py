@@ -25,6 +25,7 @@ from sainet.learning.recipes import PAPER, SingleSteps
 from sainet.models.dynamics import predict
 from sainet.models.ensemble_card import ENSEMBLE, member
 from sainet.models.library import load_model
+from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, BadSetting, BadStore
 from sainet.scenes.pushes import command_path
 from sainet.scenes.state import pack_motion
@@ -127,6 +128,17 @@ def test_no_member_is_trained_on_the_pushes_of_the_calibration(folder, store):
         evaluate([load_model(str(folder))], store)
 
 
+def test_pushes_that_the_engine_was_identified_on_are_refused(store, tmp_path):
+    known = digests_to_text(store.push_hashes()[-15:])
+    engine = InternalEngine(SIMULATORS["planar"], pushes=known)
+    some = store.first(50)
+    fit_ensemble("sain", some, RECIPE, tmp_path, members=2, assumed_engine=engine)
+    with pytest.raises(BadCheckpoint, match="was trained on 10 of these 10"):
+        evaluate([load_model(str(tmp_path))], store.take(range(50, 60)))
+    with pytest.raises(BadCheckpoint, match="network was trained on 10 of these 10"):
+        evaluate([load_model(str(member(tmp_path, 1)))], store.take(range(50, 60)))
+
+
 def test_members_are_networks_of_consecutive_seeds(folder, store, tmp_path):
     rest, _ = split_rows(store.repeats(), CALIBRATION, RECIPE.seed)
     alone = RECIPE.changed(seed=RECIPE.seed + 1)
@@ -157,7 +169,7 @@ def test_members_train_at_once_on_a_gpu(store, folder, tmp_path, monkeypatch):
 def test_an_identical_call_changes_nothing(folder, store):
     before = {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
     told = RECIPE.changed(log_every=2, checkpoint_every=7)
-    planar = InternalEngine(SIMULATORS["planar"])
+    planar = InternalEngine(SIMULATORS["planar"], pushes="AAAAAAAA")
     for recipe, engine in ((RECIPE, "planar"), (told, planar)):
         fit_ensemble(
             folder.name, store, recipe, folder, members=MEMBERS, assumed_engine=engine

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 from scipy.stats import multivariate_normal
 from tinygp import kernels, transforms
 from tinygp.kernels.distance import L2Distance
@@ -38,6 +39,7 @@ from sainet.models.correctors.process import correlation, error_near
 from sainet.models.fitted_process import Fitted, corrector_of, rates_at
 from sainet.models.library import load_model
 from sainet.models.process_card import ARRAYS, PROCESS, ProcessSettings
+from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
 from sainet.scenes.controls import PathControls
 from sainet.scenes.geometry import rotate
@@ -431,6 +433,14 @@ def test_too_few_known_ends_leave_no_folder(tmp_path, seen, says):
     with pytest.raises(BadStore, match=says):
         fit_process(store, out, PLANAR, ProcessSettings(features="angle"))
     assert not out.exists()
+
+
+def test_pushes_that_the_engine_was_identified_on_are_refused(store, tests, tmp_path):
+    engine = structs.replace(PLANAR, pushes=digests_to_text(tests.push_hashes()))
+    fit_process(store.first(TRAINED), tmp_path, engine, QUICK)
+    with pytest.raises(BadCheckpoint, match="was trained on 15 of these 15"):
+        evaluate([load_model(str(tmp_path))], tests)
+    fit_process(store.first(TRAINED), tmp_path, PLANAR, QUICK)  # the same settings
 
 
 def edited(folder, tmp_path, **changes):

@@ -5,13 +5,22 @@ import subprocess
 import sys
 
 import pytest
+from msgspec import structs, to_builtins
 
+from models.samples import identified_folder
 from models.test_checkpoint import edit_card, edit_simulator, write_network
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.simulator import TRUE_PROPERTIES
-from sainet.models.card import CARD
+from sainet.models.card import CARD, IDENTIFIED, read_identified
 from sainet.models.dynamics import LearnedDynamics, SimulatorAugmented
-from sainet.models.library import PRETRAINED, SHIPPED, load_model, shipped_for
+from sainet.models.library import (
+    PRETRAINED,
+    SHIPPED,
+    find_internal_engine,
+    load_model,
+    shipped_for,
+)
+from sainet.runs.documents import write_document
 from sainet.runs.errors import BadCheckpoint, MissingExtra
 from sainet.scenes.scene import TIME_STEP
 
@@ -91,3 +100,12 @@ def test_loading_a_network_does_not_import_scipy():
     found = subprocess.check_output([sys.executable, "-c", code], text=True).split()
     assert "jax" in found
     assert "scipy.linalg" not in found
+
+
+def test_an_identified_engine_brings_the_pushes_that_it_was_identified_on(tmp_path):
+    engine = identified_folder(tmp_path)
+    assert find_internal_engine(str(tmp_path)).settings == to_builtins(engine)
+    found = structs.replace(read_identified(tmp_path), digests="AAAAAAAA")
+    write_document(tmp_path / IDENTIFIED, found)
+    again = find_internal_engine(str(tmp_path))
+    assert (again.pushes, again.settings) == ("AAAAAAAA", to_builtins(engine))

@@ -19,7 +19,7 @@ from sainet.learning.log import reported
 from sainet.learning.process import fit_process, fits_of
 from sainet.learning.recipes import FROM_ENGINE, Recipe, recipe_for, start_named
 from sainet.models.identity import LEARNED, ModelKind, ProcessFeatures
-from sainet.models.library import find_internal_engine, identified_physics
+from sainet.models.library import engine_of, find_internal_engine, identified_physics
 from sainet.models.model import Model
 from sainet.models.process_card import ProcessSettings
 from sainet.runs.documents import checked
@@ -208,7 +208,7 @@ def _internal(engine: Loadable) -> InternalEngine:
             f"your own, or one of {', '.join(SIMULATORS)}."
         )
     register(found)
-    return found.internal
+    return engine_of(found.identified) if found.identified else found.internal
 
 
 def _folder(out: Folder | None) -> AbstractContextManager[str]:

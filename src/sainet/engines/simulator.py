@@ -155,6 +155,13 @@ class InternalEngine(msgspec.Struct, frozen=True):
 
     simulator: SimulatorSpec
     camera: CameraOffset = AGREES
+    # That it was identified on (`runs.digests`); only of an engine to train around.
+    pushes: str | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def settings(self) -> object:
+        """What decides its predictions, as JSON values."""
+        return msgspec.to_builtins(InternalEngine(self.simulator, self.camera))
 
 
 # Specifications by the names that options take and that stored arrays have.

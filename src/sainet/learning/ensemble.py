@@ -95,7 +95,7 @@ def fit_ensemble(
         calibrated = _calibrate(dynamics, cards[0].camera, store.take(np.sort(held)))
         card = EnsembleCard(
             members=tuple(each.weights for each in cards),
-            pushes=digests_to_text(store.push_hashes()),
+            pushes=digests_to_text(store.push_hashes(), cards[0].pushes),
             final_loss=loss,
             **calibrated._asdict(),
         )

@@ -26,7 +26,7 @@ from sainet.models.checkpoint import load_arrays, load_network, save_arrays
 from sainet.models.correctors.network import AbstractNetwork
 from sainet.models.identity import ModelId, ModelKind, TrainingData
 from sainet.models.library import SHIPPED, find_internal_engine, network_folder
-from sainet.runs.digests import digests_from_text, digests_to_text
+from sainet.runs.digests import digests_to_text
 from sainet.runs.documents import content_hash, read_document, write_document
 from sainet.runs.errors import BadInput, Diverged, UnknownName
 from sainet.runs.folders import RunFolder, open_run
@@ -295,5 +295,6 @@ def _training_data(task: Task) -> TrainingData:
 
 def _pushes(mixture: Mixture, start: Card | None) -> str:
     """Return the pushes that the network was ever trained on, as far as known."""
-    before = digests_from_text(start.pushes if start else "")
-    return digests_to_text(np.concatenate([before, mixture.push_hashes()]))
+    inner = mixture.lead.inner
+    before = start.pushes if start else "", (inner and inner.pushes) or ""
+    return digests_to_text(mixture.push_hashes(), *before)

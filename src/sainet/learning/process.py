@@ -67,7 +67,7 @@ def fit_process(
         RunConflict: the folder contains something else.
     """
     check_store(store, settings)
-    given = "identified" if callable(internal) else msgspec.to_builtins(internal)
+    given = "identified" if callable(internal) else internal.settings
     config = {"command": "tune", "model": "gp", "internal_engine": given}
     config |= {"data": store.content, **msgspec.to_builtins(settings)}
     folder = open_run(out, config, finished_by=PROCESS)
@@ -92,7 +92,7 @@ def fit_process(
         data=store.content,
         disks=info.bodies,
         trained_pushes=len(ends.travel),
-        pushes=digests_to_text(store.push_hashes()),
+        pushes=digests_to_text(store.push_hashes(), internal.pushes or ""),
         groups=groups_of([store]),
         weights=content_hash(data),
         inputs=best.names,

@@ -169,7 +169,7 @@ def settings(task: Task) -> dict[str, object]:
     return {
         "command": "train",
         "model": task.model,
-        "internal_engine": msgspec.to_builtins(task.assumed),
+        "internal_engine": task.assumed.settings,
         "data": task.store.content,
         **start,
         **recipe,

@@ -272,4 +272,9 @@ def find_internal_engine(name: str | InternalEngine) -> InternalEngine:
     folder = Path(name)
     if name in SIMULATORS or not folder.is_dir():
         return InternalEngine(simulator_named(name))
-    return read_identified(folder).engine
+    return engine_of(read_identified(folder))
+
+
+def engine_of(found: Identified) -> InternalEngine:
+    """Return an identified engine with the pushes, to train around."""
+    return msgspec.structs.replace(found.engine, pushes=found.digests)

@@ -11,9 +11,18 @@ from sainet.runs.errors import BadInput
 BYTES = 6  # of a hash: among 10^5 pushes a chance collision has a probability of 2e-5
 
 
-def digests_to_text(hashes: UInt64[np.ndarray, " push"]) -> str:
-    """Return a set of hashes as text (Base64): eight characters each, sorted."""
-    values = np.unique(hashes).astype(">u8").view(np.uint8).reshape(-1, 8)
+def digests_to_text(hashes: UInt64[np.ndarray, " push"], *others: str) -> str:
+    """Return a set of hashes as text (Base64): eight characters each, sorted.
+
+    Args:
+        hashes: to include.
+        others: sets as text, to include as well.
+
+    Raises:
+        BadInput: one of these is damaged.
+    """
+    whole = np.concatenate([hashes, *map(digests_from_text, others)])
+    values = np.unique(whole).astype(">u8").view(np.uint8).reshape(-1, 8)
     return base64.b64encode(values[:, 8 - BYTES :].tobytes()).decode()
 
 
