@@ -361,9 +361,42 @@ def test_an_engine_that_assumes_quite_other_disks_is_named(tmp_path, caplog):
 def test_a_horizon_before_the_first_observation_is_refused(tmp_path):
     info = info_of(6, bodies=2)
     store = write(tmp_path / "ends", info, end_points_alone(made_up(info)))
-    with pytest.raises(BadStore, match="first 8 steps of any push; train on more `st"):
-        fit("in", store, TUNING.changed(steps=8), tmp_path / "out")
+    lengths = np.where(np.arange(6) % 2, 6, 12)
+    arrays = end_points_alone(made_up(info, lengths))
+    uneven = write(tmp_path / "uneven", info, arrays)
+    short = {"steps": 12, "short_iterations": 2}
+    for each, settings, says in (
+        (store, {"steps": 8}, "push of 12 steps is observed in its first 8; train on"),
+        (uneven, {"steps": 6}, "of 12 steps is observed in its first 6; .* `steps`.$"),
+        (uneven, short, "of 6 steps is observed in its first 3.* `short_iterations`.$"),
+    ):
+        with pytest.raises(BadStore, match=says):
+            fit("in", each, TUNING.changed(**settings), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_batches_without_an_observation_count_nothing(tmp_path):
+    """No push of six steps was observed; nor was any of some batches of twelve."""
+    info = info_of(12, bodies=2)
+    lengths = np.where(np.arange(12) % 2, 6, 12)
+    arrays = end_points_alone(made_up(info, lengths))
+    arrays["pose_observed"][1:-2] = False
+    arrays["pose_observed"][-1] = False
+    store = write(tmp_path / "ends", info, arrays)
+    recipe = TUNING.changed(batch_size=1, validation_share=0.0)
+    losses = [line.loss for line in fit("in", store, recipe, tmp_path / "out").history]
+    assert np.isfinite(losses).all()
+    assert 0.0 in losses
+
+
+def test_validation_pushes_need_an_observation(tmp_path):
+    info = info_of(20, bodies=2)
+    arrays = end_points_alone(made_up(info))
+    kept = Task("in", write(tmp_path / "all", info, arrays), TUNING, PLANAR).validation
+    arrays["pose_observed"][np.array(kept.rows)] = False
+    store = write(tmp_path / "ends", info, arrays)
+    with pytest.raises(BadStore, match="no push of 12 steps is observed"):
+        fit("in", store, TUNING, tmp_path / "out")
 
 
 def test_patience_needs_pushes_to_validate_on():

@@ -59,14 +59,23 @@ def check_task(task: Task) -> None:
 
 
 def _check_observed(task: Task) -> None:
-    """Raise `BadStore` if the first steps, on which networks train, are unknown."""
-    steps = task.recipe.horizon.steps
-    known = task.store.read(slice(None), ("pose_observed", "rate_observed"))
-    if not any(each[:, :steps].any() for each in known.values()):
-        raise BadStore(
-            f"{task.store.path}: nothing is observed in the first {steps} steps of any "
-            "push; train on more `steps`."
-        )
+    """Raise `BadStore` if the first steps, on which networks train, are unknown.
+
+    Batches are of one length. Of a length that was never observed, all count nothing.
+    """
+    horizon = task.recipe.horizon
+    steps = task.short_steps if horizon.short_iterations else horizon.steps
+    remedy = ", and without `short_iterations`" * (horizon.short_iterations > 0)
+    for part in filter(None, (task.training, task.validation)):
+        known = part.read(slice(None), ("pose_observed", "rate_observed", "steps"))
+        seen = (known["pose_observed"] > 0) | (known["rate_observed"] > 0)
+        chosen = seen.any(axis=1) | (not seen.any())
+        for length in np.unique(known["steps"][chosen]):
+            if not seen[known["steps"] == length, :steps].any():
+                raise BadStore(
+                    f"{part.path}: no push of {length} steps is observed in its first "
+                    f"{steps}; train on more `steps`{remedy}."
+                )
 
 
 def other_disks(task: Task) -> Iterator[str]:

@@ -229,11 +229,16 @@ def make_step(
 
     def step(state: FitState, batch: PushBatch) -> tuple[FitState, Array]:
         total, summed = gradient(state.network, batch)
-        pushes = jnp.sum(batch.is_observed)
+        pushes = _observed(batch)
         after = _update(state, start, summed, pushes, optimiser=optimiser, l2=l2)
         return after, total / pushes
 
     return step
+
+
+def _observed(batch: PushBatch) -> Array:
+    """Return the number of observed pushes, by which sums are divided: at least 1."""
+    return jnp.maximum(jnp.sum(batch.is_observed), 1)
 
 
 class Side(eqx.Module):
@@ -259,7 +264,7 @@ def step_in_one(optimiser: Optimiser, hold: int, side: Side) -> tuple[FitState, 
         return data_loss(with_layers(network, layers), batch, side.weights, hold)
 
     total, summed = jax.value_and_grad(loss)(trained_layers(network))
-    pushes = jnp.sum(batch.is_observed)
+    pushes = _observed(batch)
     after = _update(
         side.state, side.start, summed, pushes, optimiser=optimiser, l2=side.l2
     )
