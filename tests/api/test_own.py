@@ -7,14 +7,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 
 import sainet as sn
 from contracts.worlds import make_scene
+from models.samples import identified_folder
+from sainet.api.learning import _internal
 from sainet.datasets.batch import from_trajectory, to_controls, to_initial, to_scene
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines.simulator import OWN, BulletSpec, InternalEngine
+from sainet.models.card import IDENTIFIED, read_identified
 from sainet.models.dynamics import predict
+from sainet.runs.documents import write_document
 from sainet.runs.errors import BadCheckpoint, BadInput, RunConflict, UnknownName
 from sainet.scenes.pushes import command_force, command_path
 from sainet.tasks.push_to_goal import PushToGoal
@@ -179,6 +184,13 @@ def test_an_engine_without_derivatives_is_not_identified(slipped):
     physics = replace(sn.load("physics"), internal=bullet)
     with pytest.raises(BadInput, match="`engine` is bullet, which has no derivatives"):
         sn.identify(slipped, engine=physics)
+
+
+def test_an_identified_engine_brings_its_pushes_into_training(tmp_path):
+    identified_folder(tmp_path)
+    found = structs.replace(read_identified(tmp_path), digests="AAAAAAAA")
+    write_document(tmp_path / IDENTIFIED, found)
+    assert _internal(sn.load(tmp_path)).pushes == "AAAAAAAA"
 
 
 def test_errors_of_a_step_in_numpy_stay_as_they_are():
