@@ -1,6 +1,7 @@
 """Several networks that train at once on a GPU, which one alone leaves mostly idle."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -8,10 +9,11 @@ from jaxtyping import Array
 
 from sainet.learning.job import Job, finish
 from sainet.learning.mixture import Batches
-from sainet.learning.recipes import Recipe
 from sainet.learning.step import FitState, Side, step_together
 from sainet.runs.errors import Diverged
 from sainet.runs.interrupts import raise_if_interrupted
+
+_T = TypeVar("_T")
 
 
 def fit_together(
@@ -33,17 +35,17 @@ def fit_together(
             finish(job)
     members = [_Member(job) for job in jobs if job.left]
     try:
-        for alike in _alike(members):
+        for alike in _alike(members, lambda member: member.form):
             _iterate(alike, on_step)
     finally:
         for member in members:
             member.close()
 
 
-def _alike(members: Sequence["_Member"]) -> Iterable[list["_Member"]]:
-    groups: dict[object, list[_Member]] = {}
-    for member in members:
-        groups.setdefault(member.form, []).append(member)
+def _alike(items: Iterable[_T], form: Callable[[_T], object]) -> Iterable[list[_T]]:
+    groups: dict[object, list[_T]] = {}
+    for item in items:
+        groups.setdefault(form(item), []).append(item)
     return groups.values()
 
 
@@ -72,21 +74,9 @@ class _Member:
 
 
 def _form(side: Side) -> object:
+    """Return what sides have in common that are stacked, such as numbers of steps."""
     shapes = [(x.shape, x.dtype) for x in jax.tree.leaves(side)]
     return jax.tree.structure(side), tuple(shapes)
-
-
-def _step(recipe: Recipe, sides: Sequence[Side]) -> list[tuple[FitState, Array]]:
-    """Return next states and losses; batches of one number of steps go at once."""
-    alike: dict[object, list[int]] = {}
-    for number, side in enumerate(sides):
-        alike.setdefault(_form(side), []).append(number)
-    found: dict[int, tuple[FitState, Array]] = {}
-    for numbers in alike.values():
-        some = tuple(sides[number] for number in numbers)
-        after = step_together(recipe.optimiser, recipe.horizon.hold, some)
-        found |= zip(numbers, after, strict=True)
-    return [found[number] for number in range(len(sides))]
 
 
 def _iterate(
@@ -95,8 +85,12 @@ def _iterate(
     recipe = members[0].job.recipe
     for iteration in members[0].job.left:
         raise_if_interrupted()
-        found = _step(recipe, [member.side(iteration) for member in members])
-        members = list(_noted(members, iteration, found))
+        sides = [(member, member.side(iteration)) for member in members]
+        members = []
+        for alike in _alike(sides, lambda each: _form(each[1])):
+            some, inputs = zip(*alike, strict=True)
+            found = step_together(recipe.optimiser, recipe.horizon.hold, inputs)
+            members += _noted(some, iteration, found)
         if not members:
             return
         on_step(iteration, members[0].job.progress.last_loss)

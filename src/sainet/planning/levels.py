@@ -179,6 +179,11 @@ class Problem:
         """How many steps each push is predicted for."""
         return settled_steps(self.pushes, self.scene.time_step)
 
+    def shared(self, dynamics: AbstractDynamics) -> Shared:
+        """Return what all candidate pushes share that some dynamics predict."""
+        crowded = may_lack_room(self.scene, self.pushes)
+        return dynamics, self.task, self.scene, self.steps, crowded
+
     @property
     def is_near(self) -> bool:
         """Whether the goal is within 10 mm (as in the paper)."""

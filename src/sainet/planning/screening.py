@@ -16,7 +16,6 @@ from jaxtyping import Array, Float, Int
 
 from sainet.engines.devices import over_devices
 from sainet.models.dynamics import AbstractDynamics
-from sainet.planning.checks import may_lack_room
 from sainet.planning.levels import (
     AT_ONCE,
     Level,
@@ -75,8 +74,7 @@ class Screen:
         """Return the cost of pushes by the engine and the residuals of first pushes."""
         problem = self.problem
         added = jax.tree.map(lambda x: x[actions], self._residual)
-        crowded = may_lack_room(problem.scene, problem.pushes)
-        shared = engine, problem.task, problem.scene, problem.steps, crowded
+        shared = problem.shared(engine)
         rows = states, problem.at(actions), added
         return np.asarray(over_devices(_corrected_cost, shared, *rows, most=AT_ONCE))
 
