@@ -120,15 +120,8 @@ def _connected(address: str) -> Any:  # noqa: ANN401
     return client
 
 
-def _prepare(
-    client: str,
-    wanted: Mapping[str, str | None],
-    dask_worker: Any,  # noqa: ANN401
-) -> None:
-    """Prepare a worker, before it imports JAX, or refuse it.
-
-    Dask keeps a worker that comes later in spite of an error: its jobs raise it.
-    """
+def _prepare(client: str, wanted: Mapping[str, str | None], dask_worker: Any) -> None:  # noqa: ANN401
+    """Prepare a worker, before it imports JAX, or refuse it: if late, in its jobs."""
     use_cache()
     try:
         _check_worker(wanted, dask_worker)
