@@ -380,9 +380,9 @@ CONNECTIONS = {
     "kinds of pushes in own tables, origins of datasets": 17,
     "planned pushes of any length, what reviews of all layers found": 44,
     "disks that the internal engine assumes wrongly": 22,
-    # Blocks of angles that are cut nowhere, workers that come late, Ctrl-C at the start,
-    # pushes known to an engine inside a model, steps that nothing observed, values out
-    # of range in simulations, labels on pages.
+    # Blocks of angles that are cut nowhere, workers that come late, Ctrl-C at the
+    # start, pushes known to an engine inside a model, steps that nothing observed,
+    # values out of range in simulations, labels on pages.
     "what further reviews found": 127,
     "a shorter training beside the paper's recipe": 27,
     # Shares of datasets, trials and evaluations, the options of five commands, and
@@ -413,8 +413,8 @@ COUNTS = {
         # Models, steps and names of a user's own wherever one plans or identifies, and
         # what is said of wrong arguments: 126 lines more than before. Figures of errors
         # disk by disk and of ranges: 50 more. Leading axes of controls, bounds in
-        # single precision, numbers of pushes and steps: 9. Predictions of pushes with one
-        # hash, engines of one name, types of settings: 23.
+        # single precision, numbers of pushes and steps: 9. Predictions of pushes with
+        # one hash, engines of one name, types of settings: 23.
         3_748,
         3_540,
     ),
