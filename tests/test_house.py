@@ -383,7 +383,7 @@ CONNECTIONS = {
     # Blocks of angles that are cut nowhere, workers that come late, Ctrl-C at the
     # start, pushes known to an engine inside a model, steps that nothing observed,
     # values out of range in simulations, labels on pages.
-    "what further reviews found": 127,
+    "what further reviews found": 134,
     "a shorter training beside the paper's recipe": 27,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.

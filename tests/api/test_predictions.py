@@ -118,8 +118,18 @@ def test_quoted_names_of_columns_are_read(pose, pushes, tmp_path):
     header, rest = path.read_text().split("\n", 1)
     names = ", ".join(f'"{name}"' for name in header.split(",")).replace(", ", " ,")
     (tmp_path / "quoted.csv").write_text(f"{names}\n{rest}")
-    found = sn.from_predictions(tmp_path / "quoted.csv").dynamics.pose
-    np.testing.assert_array_equal(found, sn.from_predictions(path).dynamics.pose)
+    (tmp_path / "returns.csv").write_text(path.read_text().replace("\n", "\r"))
+    expected = sn.from_predictions(path).dynamics.pose
+    for name in ("quoted.csv", "returns.csv"):
+        found = sn.from_predictions(tmp_path / name).dynamics.pose
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_prediction_suffices(kind, pose, pushes, tmp_path):
+    one = pushes.first(1)
+    found = sn.from_predictions(write(tmp_path, kind, pose[:1], one), one)
+    assert sn.evaluate([found], one)
 
 
 def test_predictions_of_another_size_are_refused(pose, pushes, tmp_path):

@@ -221,6 +221,9 @@ def test_impossible_ensembles_are_refused(store, tmp_path):
     with pytest.raises(BadInput, match="`features` is contact"):
         contact = RECIPE.changed(features="contact")
         fit_ensemble("sain", store, contact, tmp_path / "d", members=2)
+    with pytest.raises(BadSetting, match="`seed` is 4294967296"):
+        last = RECIPE.changed(seed=2**32 - 1)
+        fit_ensemble("in", store, last, tmp_path / "e", members=2)
     assert not list(tmp_path.iterdir())
 
 

@@ -395,8 +395,22 @@ def test_validation_pushes_need_an_observation(tmp_path):
     kept = Task("in", write(tmp_path / "all", info, arrays), TUNING, PLANAR).validation
     arrays["pose_observed"][np.array(kept.rows)] = False
     store = write(tmp_path / "ends", info, arrays)
-    with pytest.raises(BadStore, match="no push of 12 steps is observed"):
+    with pytest.raises(BadStore, match="no validation push is observed in its first"):
         fit("in", store, TUNING, tmp_path / "out")
+
+
+def test_validation_takes_whole_pushes_also_where_training_begins_with_short_ones(
+    tmp_path,
+):
+    info = info_of(20, bodies=2)
+    arrays = made_up(info)
+    recipe = TUNING.changed(steps=12, short_iterations=2, validation_share=0.2)
+    kept = Task("in", write(tmp_path / "all", info, arrays), recipe, PLANAR).validation
+    arrays["pose_observed"][np.array(kept.rows), :5] = False
+    arrays["rate_observed"][np.array(kept.rows), :5] = False
+    store = write(tmp_path / "late", info, arrays)
+    done = fit("in", store, recipe, tmp_path / "out")
+    assert np.isfinite([line.loss for line in done.history]).all()
 
 
 def test_patience_needs_pushes_to_validate_on():

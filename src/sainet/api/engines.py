@@ -256,9 +256,9 @@ def own_model(engine: AbstractPathEngine, spec: OwnSpec) -> Model:
 
 
 def register(model: Model) -> None:
-    """Register the engine of a model anew, if it is a user's own.
+    """Give the engine of a model its name again, if it is a user's own.
 
-    Another one of the same name may have been made since.
+    Another one of that name may have been made since; it loses the name.
     """
     match model:
         case Model(

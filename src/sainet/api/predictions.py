@@ -1,6 +1,5 @@
 """Files of predictions that were made elsewhere, as models."""
 
-import csv
 import io
 import zipfile
 from collections.abc import Callable, Mapping
@@ -33,6 +32,7 @@ from sainet.scenes.state import State, Trajectory
 _POSE = ("x", "y", "angle")
 _RANGES = (POSITION, POSITION, ANGLE)
 _TIMED = 4  # axes of poses with time
+_HEADER = 10_000  # bytes, at most, of the names of columns
 
 
 class FilePredictions(AbstractDynamics):
@@ -128,7 +128,7 @@ def from_predictions(
     hashes = _hashes(path, content, pushes)
     order = np.argsort(hashes, kind="stable")
     hashes, pose = hashes[order], content.pose[order]
-    differ = (pose[1:] != pose[:-1]).reshape(len(pose) - 1, -1).any(axis=-1)
+    differ = (pose[1:] != pose[:-1]).any(axis=tuple(range(1, pose.ndim)))
     if len(alike := np.flatnonzero((hashes[1:] == hashes[:-1]) & differ)):
         rows = " and ".join(map(str, sorted(order[alike[0] :][:2])))
         raise BadInput(
@@ -209,8 +209,8 @@ def _arrays(path: Path, data: bytes) -> Mapping[str, np.ndarray]:
 
 
 def _from_csv(path: Path, data: bytes) -> _Content:
-    first = data.partition(b"\n")[0].decode("utf-8-sig", "replace")
-    header = [name.strip() for name in next(csv.reader([first]), [])]
+    lines = data[:_HEADER].decode("utf-8-sig", "replace").splitlines()
+    header = [name.strip(' "') for name in "".join(lines[:1]).split(",")]
     are_hashes, has_steps = "hash" in header, "step" in header
     numbers = ("body", *_POSE, *(["step"] if has_steps else []))
     columns = Columns(

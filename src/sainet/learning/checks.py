@@ -66,16 +66,26 @@ def _check_observed(task: Task) -> None:
     horizon = task.recipe.horizon
     steps = task.short_steps if horizon.short_iterations else horizon.steps
     remedy = ", and without `short_iterations`" * (horizon.short_iterations > 0)
-    for part in filter(None, (task.training, task.validation)):
-        known = part.read(slice(None), ("pose_observed", "rate_observed", "steps"))
-        seen = (known["pose_observed"] > 0) | (known["rate_observed"] > 0)
-        chosen = seen.any(axis=1) | (not seen.any())
-        for length in np.unique(known["steps"][chosen]):
-            if not seen[known["steps"] == length, :steps].any():
-                raise BadStore(
-                    f"{part.path}: no push of {length} steps is observed in its first "
-                    f"{steps}; train on more `steps`{remedy}."
-                )
+    seen, lengths = _seen(task.training)
+    chosen = seen.any(axis=1) | (not seen.any())
+    for length in np.unique(lengths[chosen]):
+        if not seen[lengths == length, :steps].any():
+            raise BadStore(
+                f"{task.training.path}: no push of {length} steps is observed in its "
+                f"first {steps}; train on more `steps`{remedy}."
+            )
+    if task.validation and not _seen(task.validation)[0][:, : horizon.steps].any():
+        raise BadStore(
+            f"{task.validation.path}: no validation push is observed in its first "
+            f"{horizon.steps} steps; train on more `steps`."
+        )
+
+
+def _seen(store: Store) -> tuple[np.ndarray, np.ndarray]:
+    """Return which steps are observed, [push, time], and the steps of each push."""
+    known = store.read(slice(None), ("pose_observed", "rate_observed", "steps"))
+    seen = (known["pose_observed"] > 0) | (known["rate_observed"] > 0)
+    return seen, known["steps"]
 
 
 def other_disks(task: Task) -> Iterator[str]:

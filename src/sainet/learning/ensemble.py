@@ -29,6 +29,7 @@ from sainet.runs.documents import write_document
 from sainet.runs.errors import BadSetting, BadStore
 from sainet.runs.folders import open_run
 from sainet.scenes.geometry import rotate
+from sainet.scenes.quantities import require_seed
 from sainet.scenes.recording import CameraOffset
 
 CALIBRATION = 0.2  # share of the pushes that no member is trained on
@@ -76,6 +77,7 @@ def fit_ensemble(
         raise BadSetting("members", members, f"from {low} to {high}")
     if isinstance(recipe.horizon, SingleSteps):
         raise BadSetting("members", members, "left out for networks of single steps")
+    require_seed(recipe.seed + members - 1)  # of the last member
     rest, held = divided(store, recipe.seed)
     training = store.take(np.sort(rest))
     settings = prepared(model, training, recipe, assumed_engine).settings()
