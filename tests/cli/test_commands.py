@@ -247,7 +247,7 @@ def test_control(tmp_path):
     for name in ("episodes.svg", "episode-000.mp4", "replay.html"):
         assert (out / name).stat().st_size > 0
     command = "sainet control --model physics --goals hard --trials 2 --pushes 1"
-    assert f"{command} --animate" in (out / "replay.html").read_text()
+    assert f"{command} --out {out} --animate" in (out / "replay.html").read_text()
     done = sainet("report", out, "--json")
     assert json.loads(done.stdout) == {"report": str(out / "report.html")}
     assert "Pushing to a goal" in (out / "report.html").read_text()
