@@ -168,9 +168,9 @@ def test_members_train_at_once_on_a_gpu(store, folder, tmp_path, monkeypatch):
 
 def test_an_identical_call_changes_nothing(folder, store):
     before = {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()}
-    told = RECIPE.changed(log_every=2, checkpoint_every=7)
+    reporting = RECIPE.changed(log_every=2, checkpoint_every=7)
     planar = InternalEngine(SIMULATORS["planar"], pushes="AAAAAAAA")
-    for recipe, engine in ((RECIPE, "planar"), (told, planar)):
+    for recipe, engine in ((RECIPE, "planar"), (reporting, planar)):
         fit_ensemble(
             folder.name, store, recipe, folder, members=MEMBERS, assumed_engine=engine
         )
