@@ -30,11 +30,7 @@ from sainet.cli.train import Train
 from sainet.cli.tune import Tune
 from sainet.runs.documents import is_full
 from sainet.runs.errors import BadInput, BadTable, SainetError, unknown_name
-from sainet.runs.interrupts import (
-    INTERRUPTED,
-    raise_interrupts,
-    remembered_interrupts,
-)
+from sainet.runs.interrupts import INTERRUPTED, raise_interrupts, remembered_interrupts
 
 _COMMANDS = {
     "demo": Demo,

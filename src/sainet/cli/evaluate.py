@@ -176,12 +176,7 @@ class Evaluate:
         return {"out": str(self.out), "shard": str(shard), "models": len(own)}
 
     def _parts(
-        self,
-        out: Path,
-        models: "list[Model]",
-        store: "Store",
-        *,
-        shared: bool = False,
+        self, out: Path, models: "list[Model]", store: "Store", *, shared: bool = False
     ) -> "Parts":
         from sainet.evaluation.parts import Parts
 

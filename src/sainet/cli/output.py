@@ -6,7 +6,6 @@ import sys
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, ExitStack, suppress
 from dataclasses import dataclass
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from sainet.runs import progress
@@ -15,9 +14,7 @@ from sainet.runs.progress import COMPILING, Advance
 if TYPE_CHECKING:
     from rich.console import Console
 
-if TYPE_CHECKING:
     from sainet.studies.runner import Progress
-
 
 Json = Mapping[str, object]  # the object that a command prints with `json`
 
@@ -97,12 +94,7 @@ class Bars:
         """Return these bars."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Stop the bar that an error interrupted."""
         self._bar.close()
 

@@ -129,10 +129,7 @@ class Reproduce:
         return expected
 
     def _report(
-        self,
-        lasts: Sequence["Step[Any]"],
-        not_run: Mapping[str, str],
-        runner: "Runner",
+        self, lasts: Sequence["Step[Any]"], not_run: Mapping[str, str], runner: "Runner"
     ) -> None:
         """Write the report of all studies in the folder."""
         from sainet.report.pages.page import REPORT, write_report

@@ -215,10 +215,7 @@ def check_values(
 
 
 def out_of_range(
-    info: StoreInfo,
-    rows: np.ndarray,
-    arrays: Arrays,
-    read: Callable[[str], np.ndarray],
+    info: StoreInfo, rows: np.ndarray, arrays: Arrays, read: Callable[[str], np.ndarray]
 ) -> Iterator[tuple[str, str]]:
     """Yield arrays with a value out of range: name, and push and value as a reason.
 

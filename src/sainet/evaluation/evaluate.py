@@ -54,11 +54,7 @@ def evaluate(
     hashes = store.push_hashes() if fitted and not force else None
     for model in () if force else models:
         model.check_fits(
-            info.kind,
-            info.time_step,
-            disks=info.bodies,
-            seed=info.seed,
-            pushes=hashes,
+            info.kind, info.time_step, disks=info.bodies, seed=info.seed, pushes=hashes
         )
     pushes = StoredPushes(store, steps_to_predict(store, steps))
     made = {m.name: partial(_errors, m, pushes, on_pushes) for m in models}

@@ -222,10 +222,7 @@ def _poses(state: State) -> Float[Array, "1 body 3"]:
 
 @eqx.filter_jit
 def _most_probable(
-    begin: Properties,
-    given: _Given,
-    pushes: _Pushes,
-    seen: Float[Array, "1 body 3"],
+    begin: Properties, given: _Given, pushes: _Pushes, seen: Float[Array, "1 body 3"]
 ) -> Properties:
     """Return the most probable properties: damped Gauss-Newton steps."""
     vector, to_properties = ravel_pytree(begin)

@@ -149,9 +149,7 @@ def _possible_pushes(fitted: Fitted, card: ProcessCard) -> list[_Push]:
     x, y, direction = (
         low + (high - low) * share
         for (low, high), share in zip(
-            (ranges.get(name, (0.0, 0.0)) for name in names),
-            draw[:, 2:].T,
-            strict=True,
+            (ranges.get(name, (0.0, 0.0)) for name in names), draw[:, 2:].T, strict=True
         )
     )
     columns = (x, y, *turn.T, direction)

@@ -156,9 +156,7 @@ def _best_fit(
 
 
 def calibrated_fit(
-    ends: Ends,
-    settings: ProcessSettings,
-    on_output: Callable[[], None] = lambda: None,
+    ends: Ends, settings: ProcessSettings, on_output: Callable[[], None] = lambda: None
 ) -> _Fit:
     """Fit a process, the share of it to add, and what makes 90 % regions.
 

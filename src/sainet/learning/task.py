@@ -237,7 +237,5 @@ def widen(network: InteractionNetwork, scales: Scales) -> InteractionNetwork:
     wide = untrained(features, network.time_step, network.integrator)
     assert isinstance(wide, InteractionNetwork)
     return eqx.tree_at(
-        lambda n: (n.rel, n.dyn, n.scales),
-        wide,
-        (network.rel, dyn, widened),
+        lambda n: (n.rel, n.dyn, n.scales), wide, (network.rel, dyn, widened)
     )

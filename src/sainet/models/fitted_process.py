@@ -11,12 +11,7 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from sainet.models.checkpoint import load_arrays
 from sainet.models.correctors.kernels import KERNELS, KernelName
-from sainet.models.correctors.process import (
-    RESIDUALS,
-    Inputs,
-    Process,
-    ResidualProcess,
-)
+from sainet.models.correctors.process import RESIDUALS, Inputs, Process, ResidualProcess
 from sainet.models.process_card import ARRAYS, REMEDY, ProcessCard, read_process_card
 
 

@@ -18,9 +18,7 @@ _REACH = float(np.sqrt(-2 * np.log(1 - CONFIDENCE)))
 
 
 def mean_over(
-    region: Region,
-    value: Callable[[State], Float[Array, " push"]],
-    end: State,
+    region: Region, value: Callable[[State], Float[Array, " push"]], end: State
 ) -> Float[Array, " push"]:
     """Return the mean of a function of the final state.
 

@@ -105,10 +105,7 @@ def _residual_of(
 
 
 def _corrected_cost(
-    shared: Shared,
-    states: State,
-    pushes: Push,
-    added: Residual,
+    shared: Shared, states: State, pushes: Push, added: Residual
 ) -> Float[Array, " push"]:
     engine, _, scene, steps, _ = shared
     scenes = batch_of(scene, states.angle.shape[0])

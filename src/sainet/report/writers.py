@@ -212,7 +212,7 @@ def to_latex(table: Table) -> str:
     lines = [
         rf"\begin{{tabular}}{{{sides}}}",
         r"\hline",
-        _latex_row(headings),
+        " & ".join(map(_tex, headings)) + r" \\",
         r"\hline",
     ]
     for line in (*table.lines, *table.published):
@@ -223,10 +223,6 @@ def to_latex(table: Table) -> str:
         names = [_tex(name) for name in _names(table, line)]
         lines.append(" & ".join([*names, *texts]) + r" \\")
     return "\n".join([*lines, r"\hline", r"\end{tabular}"]) + "\n"
-
-
-def _latex_row(texts: Sequence[str]) -> str:
-    return " & ".join(map(_tex, texts)) + r" \\"
 
 
 # The bracket would be read as an argument of the end of the row before.

@@ -1,7 +1,6 @@
 """The interface of robots."""
 
 from abc import ABC, abstractmethod
-from types import TracebackType
 
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
@@ -19,12 +18,7 @@ class AbstractRobot(ABC):
         """Return this robot."""
         return self
 
-    def __exit__(  # noqa: B027
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:  # noqa: B027
         """Close the connections, if there are any."""
 
     @property

@@ -127,11 +127,8 @@ def settled_steps(push: Push, time_step: float) -> int:
     """Return the steps until pushes have ended and everything rests; not traced."""
     STROKE.check(push.length, "push: length", error=BadScene)
     SPEED.check(push.speed, "push: speed", error=BadScene)
-    length, speed, step = (
-        np.asarray(push.length),
-        np.asarray(push.speed),
-        float(time_step),
-    )
+    length, speed = np.asarray(push.length), np.asarray(push.speed)
+    step = float(time_step)
     moving = float(np.max(length / speed, initial=0.0))
     resting = float(np.max(speed / _BRAKING, initial=_TO_REST))
     # A hair less than exact: 48.00001 steps of motion are 48.

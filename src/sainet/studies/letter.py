@@ -59,9 +59,7 @@ USUAL = Stage("usual", PAPER)
 CHAIN = (
     LETTER,
     Stage(
-        "push frame",
-        _METRES.changed(features="letter-push-frame"),
-        "letter-push-frame",
+        "push frame", _METRES.changed(features="letter-push-frame"), "letter-push-frame"
     ),
     Stage("standardised inputs and outputs", _METRES, variant="loss-in-metres"),
     Stage("scaled loss", PAPER.changed(l2=1e-3), variant="large-l2"),

@@ -10,14 +10,7 @@ from functools import partial
 
 from sainet.learning.recipes import PAPER
 from sainet.studies import letter
-from sainet.studies.letter import (
-    LETTER,
-    TRAININGS,
-    USUAL,
-    Stage,
-    World,
-    sain_errs_less,
-)
+from sainet.studies.letter import LETTER, TRAININGS, USUAL, Stage, World, sain_errs_less
 from sainet.studies.paper_tables import PUBLISHED_DIRECT_FORCE_TWO_DISKS
 from sainet.studies.study import Plan, Scope, Study
 

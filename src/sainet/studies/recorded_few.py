@@ -16,10 +16,7 @@ from sainet.evaluation.claims import Claim, errs_less
 from sainet.evaluation.margins import errs_at_most_more
 from sainet.report.figures.curves import draw_data_efficiency
 from sainet.studies.candidates import ADDITIVE, NetworkCandidate, ProcessCandidate
-from sainet.studies.cross_validation import (
-    PHYSICS_IDENTIFIED,
-    fitted_and_tested,
-)
+from sainet.studies.cross_validation import PHYSICS_IDENTIFIED, fitted_and_tested
 from sainet.studies.data_efficiency import of_pushes
 from sainet.studies.recorded_models import Variant, surfaces_of
 from sainet.studies.recorded_pushes import FOLDS, JoinFolds

@@ -21,10 +21,7 @@ from sainet.report.palette import labels_of
 from sainet.report.recommending import verdict
 from sainet.report.table import Table
 from sainet.studies.candidates import Candidate
-from sainet.studies.cross_validation import (
-    PHYSICS_IDENTIFIED,
-    cross_validated,
-)
+from sainet.studies.cross_validation import PHYSICS_IDENTIFIED, cross_validated
 from sainet.studies.runner import Runner
 from sainet.studies.study import MEASUREMENTS
 

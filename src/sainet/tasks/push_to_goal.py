@@ -134,22 +134,13 @@ class PushToGoal(AbstractTask):
 
 
 # Angles from the axis through the disks, to either side (degrees).
-ANGLES: dict[Goals, tuple[float, float]] = {
-    "easy": (0.0, 30.0),
-    "hard": (30.0, 60.0),
-}
+ANGLES: dict[Goals, tuple[float, float]] = {"easy": (0.0, 30.0), "hard": (30.0, 60.0)}
 DISTANCE_RADII = 3.0
 _STREAM = 0x60A1
 
 
 def draw_goal(
-    kind: Goals,
-    seed: int,
-    trial: int,
-    *,
-    disk: np.ndarray,
-    axis: float,
-    radius: float,
+    kind: Goals, seed: int, trial: int, *, disk: np.ndarray, axis: float, radius: float
 ) -> np.ndarray:
     """Return the position of a goal (m); equal seeds and trials have equal goals.
 

@@ -90,8 +90,6 @@ class GoalRewards:
         return np.where(is_there, 0.0, -1.0).astype(np.float32)
 
 
-def is_on_table(
-    pose: Float[np.ndarray, "*env disk 3"],
-) -> Bool[np.ndarray, "*env"]:
+def is_on_table(pose: Float[np.ndarray, "*env disk 3"]) -> Bool[np.ndarray, "*env"]:
     """Return whether all poses are finite, with the centres on the table."""
     return np.asarray((np.abs(pose) <= _LARGEST).all(axis=(-2, -1)))

@@ -11,13 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.datasets.recorded.problems import Problems
-from sainet.datasets.recorded.tables import (
-    MOST_ROWS,
-    SHOWN,
-    Columns,
-    Table,
-    Texts,
-)
+from sainet.datasets.recorded.tables import MOST_ROWS, SHOWN, Columns, Table, Texts
 from sainet.datasets.schema import Arrays
 from sainet.runs.errors import BadTable, missing_extra
 

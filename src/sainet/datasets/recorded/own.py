@@ -76,10 +76,7 @@ def import_table(
         settings |= {"skip_bad": True, "left_out": count - len(recordings)}
         problems.warn(path, count - len(recordings), count)
     return import_pushes(
-        out,
-        settings,
-        [resample(recording) for recording in recordings],
-        bodies,
+        out, settings, [resample(recording) for recording in recordings], bodies
     )
 
 

@@ -108,10 +108,7 @@ class ContactNetwork(AbstractNetwork):
 
 
 def _residual(
-    layers: Layers,
-    contacts: Contacts,
-    spread: tuple[Array, Array],
-    signs: Signs,
+    layers: Layers, contacts: Contacts, spread: tuple[Array, Array], signs: Signs
 ) -> Float[Array, "3 *contact"]:
     """Return the residuals of contacts, in the push frame."""
     given = contacts.inputs

@@ -13,13 +13,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from sainet.models.blocks import (
-    ACTIONS,
-    Block,
-    Motion,
-    Properties,
-    SimulatedStep,
-)
+from sainet.models.blocks import ACTIONS, Block, Motion, Properties, SimulatedStep
 from sainet.models.correctors import Purpose
 from sainet.models.correctors.interaction import WIDTHS
 from sainet.models.correctors.network import (

@@ -16,10 +16,6 @@ OnStatus = Callable[[Status], None]
 _Key = tuple[WorldName, int, bool]  # world, disks, whether there is noise
 
 
-def _planner() -> AbstractPlanner:
-    return make_planner("greedy")
-
-
 @dataclass
 class Workshop:
     """Compiles predictions, pushes and the planner for worlds, models and disk counts.
@@ -29,7 +25,7 @@ class Workshop:
 
     predictor: Predictor
     on_status: OnStatus
-    planner: AbstractPlanner = field(default_factory=_planner)
+    planner: AbstractPlanner = field(default_factory=lambda: make_planner("greedy"))
     _disks: set[int] = field(default_factory=set)
     _worlds: set[_Key] = field(default_factory=set)
     _planning: set[tuple[str, int]] = field(default_factory=set)

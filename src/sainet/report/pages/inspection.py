@@ -8,11 +8,7 @@ from tempfile import TemporaryDirectory
 from sainet.datasets.facts import Facts
 from sainet.datasets.inspection import Inspection, Range, quantities_of
 from sainet.datasets.store import Store
-from sainet.report.figures.recordings import (
-    draw_histograms,
-    draw_pushes,
-    drawn_rows,
-)
+from sainet.report.figures.recordings import draw_histograms, draw_pushes, drawn_rows
 from sainet.report.pages.page import PlainTable, Report, write_report
 from sainet.runs.documents import read_json
 from sainet.runs.folders import CONFIG

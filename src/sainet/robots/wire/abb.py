@@ -3,7 +3,6 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 from itertools import chain
-from types import TracebackType
 
 import jax.numpy as jnp
 import numpy as np
@@ -70,12 +69,7 @@ class AbbRobot(AbstractRobot):
         self._scene = cell.scene
         self._observed: State | None = None  # since the last push
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Let go of arm and tracker."""
         self._arm.close()
         self._tracker.close()

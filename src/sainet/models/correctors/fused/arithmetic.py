@@ -4,13 +4,7 @@ import jax.numpy as jnp
 from jax import lax
 from jaxtyping import Array
 
-from sainet.models.correctors.fused.layout import (
-    COLUMNS,
-    PUSHES,
-    ROWS,
-    Ref,
-    Settings,
-)
+from sainet.models.correctors.fused.layout import COLUMNS, PUSHES, ROWS, Ref, Settings
 from sainet.models.correctors.network import FEATURE_BOUND
 from sainet.models.integrators import GRADIENT_BOUND
 

@@ -212,11 +212,7 @@ def _slopes(
 
 
 def _back(
-    settings: Settings,
-    known: Sequence[Ref],
-    now: Inputs,
-    t: Array,
-    *motion: Array,
+    settings: Settings, known: Sequence[Ref], now: Inputs, t: Array, *motion: Array
 ) -> tuple[Slopes, Array]:
     """Return the gradients by the outputs of the layers, and by the motion.
 
