@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from report.samples import record
-from sainet.cli import control
 from sainet.cli.control import Control
 from sainet.cli.entry import run as called
+from sainet.cli.output import command_of
 from sainet.control.config import ControlConfig
 
 
@@ -41,11 +41,12 @@ def test_control_prints_its_results(said):
 
 def test_the_command_on_the_page_parses():
     out, given = Path("my runs"), ["--out", "my runs", "--animate"]
+    more = {"out": out, "animate": True}
     odd = ControlConfig(model="runs/my net; ls", trials=3)
-    words = shlex.split(control._command(odd, out))
+    words = shlex.split(command_of("control", odd, **more))
     assert words[2:] == ["--model", "runs/my net; ls", "--trials", "3", *given]
     swapped = ControlConfig(robot="lab", swapped=True)
-    words = shlex.split(control._command(swapped, out))
+    words = shlex.split(command_of("control", swapped, **more))
     assert words[2:] == ["--robot", "lab", "--swapped", *given]
 
 

@@ -2,6 +2,7 @@
 
 import html
 import json
+import shlex
 import subprocess
 import sys
 
@@ -10,12 +11,13 @@ import pytest
 from selenium.webdriver.support.ui import WebDriverWait
 
 from report.test_report_browser import element, milliseconds, opened
+from sainet.cli.demo import Demo
 from sainet.cli.output import Output
 from sainet.cli.reproduce import Reproduce
 from sainet.evaluation.claims import Claim, Verdict
 from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, MissingExtra, UnknownName
-from sainet.studies import STUDIES, load_study
+from sainet.studies import STUDIES, DemoConfig, load_study
 from sainet.studies.demo import typical_push
 from sainet.studies.paper_tables import PUBLISHED_ROBOT_TWO_DISKS
 from sainet.studies.steps import Join
@@ -46,6 +48,18 @@ def test_the_demo_compares_four_models_on_both_disks(demo):
     page = html.unescape((out / "report.html").read_text())
     assert "100 pushes for 2 iterations of the paper's 10,000" in page
     assert "nearest to the median of all 6 test pushes" in page
+    assert shlex.join(["sainet", "demo", *TINY, "--out", str(out)]) in page
+
+
+def test_the_page_of_the_demo_quotes_the_command_that_was_given(monkeypatch, tmp_path):
+    def run_demo(config, out, runner, say, command):
+        raise BadInput(command)
+
+    monkeypatch.setattr("sainet.studies.demo.run_demo", run_demo)
+    monkeypatch.setattr("sainet.cli.demo.use_devices", lambda count: None)
+    config = DemoConfig(pushes=50, seed=3)
+    with pytest.raises(BadInput, match=f"demo --pushes 50 --seed 3 --out {tmp_path}$"):
+        Demo(config=config, out=tmp_path).run()
 
 
 @pytest.mark.parametrize("wanted", range(5))

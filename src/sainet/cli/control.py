@@ -1,14 +1,13 @@
 """`sainet control`."""
 
-import shlex
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sainet.cli.devices import use_cache
-from sainet.cli.output import Json, Output, progress_bar
+from sainet.cli.output import Json, Output, command_of, progress_bar
 from sainet.control.config import ControlConfig
 from sainet.runs.documents import read_json
 from sainet.runs.errors import require
@@ -135,7 +134,7 @@ class Control:
             subtitle=f"{config.model} plans, {_place(config)}",
             episodes=records,
             manifest=read_json(self.out / MANIFEST),
-            commands=(_command(config, self.out),),
+            commands=(command_of("control", config, out=self.out, animate=True),),
         )
         page = write_report(report, self.out / "replay.html")
         self.output.say(f"{film} shows the first episode; {page} plays {len(records)}.")
@@ -159,18 +158,3 @@ def _outcome(config: ControlConfig, found: "TrialRow") -> str:
         f"solved (95 % interval {low:.0%} to {high:.0%})"
         + ("." if pushes is None else f", with a median of {pushes:g} pushes.")
     )
-
-
-def _command(config: ControlConfig, out: Path) -> str:
-    """Return the command that these settings come from."""
-    usual = ControlConfig()
-    options = [
-        word
-        for name, value in asdict(config).items()
-        if value != getattr(usual, name)
-        for word in (
-            f"--{name.replace('_', '-')}",
-            *([] if value is True else [str(value)]),
-        )
-    ]
-    return shlex.join(["sainet", "control", *options, "--out", str(out), "--animate"])

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from sainet.cli.devices import use_devices
-from sainet.cli.output import Bars, Json, Output
+from sainet.cli.output import Bars, Json, Output, command_of
 from sainet.runs.workers import worker_pool
 from sainet.studies import DemoConfig
 
@@ -32,7 +32,8 @@ class Demo:
 
         with worker_pool(None) as pool, Bars(self.output) as bars:
             runner = Runner(self.out / STEPS, pool, bars)
-            result = run_demo(self.config, self.out, runner, self.output.say)
+            command = command_of("demo", self.config, out=self.out)
+            result = run_demo(self.config, self.out, runner, self.output.say, command)
         print_table(arrange(result.summary), self.output.console)
         self.output.say(f"Open {result.report} in a browser: it plays.")
         return {"report": str(result.report), **to_json_object(result.summary)}

@@ -2,16 +2,18 @@
 
 import json
 import os
+import shlex
 import sys
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from sainet.runs import progress
 from sainet.runs.progress import COMPILING, Advance
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
     from rich.console import Console
 
     from sainet.studies.runner import Progress
@@ -62,6 +64,21 @@ def drop_output() -> None:
     """Drop what standard output did not take; Python would try again at its end."""
     with suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def command_of(name: str, settings: "DataclassInstance", **others: object) -> str:
+    """Return a command line with the settings that differ from their defaults.
+
+    Args:
+        name: of the command.
+        settings: options of the command.
+        others: further options.
+    """
+    usual, words = type(settings)(), ["sainet", name]
+    given = {k: v for k, v in asdict(settings).items() if v != getattr(usual, k)}
+    for option, value in (given | others).items():
+        words += [f"--{option.replace('_', '-')}", *[str(value)] * (value is not True)]
+    return shlex.join(words)
 
 
 def progress_bar(

@@ -56,7 +56,11 @@ class DemoResult:
 
 
 def run_demo(
-    config: DemoConfig, out: Path, runner: Runner, say: Callable[[str], None]
+    config: DemoConfig,
+    out: Path,
+    runner: Runner,
+    say: Callable[[str], None],
+    command: str,
 ) -> DemoResult:
     """Run the method at small scale and write a report that plays.
 
@@ -65,6 +69,7 @@ def run_demo(
         out: folder of the demo.
         runner: of the steps, which are not repeated once they are finished.
         say: called with each stage.
+        command: that runs the demo with these settings, for the report.
     """
     settings = {"command": "demo", **asdict(config)}
     folder = open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
@@ -89,7 +94,7 @@ def run_demo(
     ]
     say("5 Drawing the figures and the report.")
     report = _draw(models, test, measured, config, out)
-    report = replace(report, table=summary, episodes=episodes)
+    report = replace(report, table=summary, episodes=episodes, commands=(command,))
     return DemoResult(write_report(report, folder.path / REPORT), summary)
 
 
@@ -160,7 +165,6 @@ def _draw(
         ),
         replays=(replay,),
         manifest=read_json(out / MANIFEST),
-        commands=("sainet demo",),
     )
 
 
