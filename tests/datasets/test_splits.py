@@ -148,6 +148,15 @@ def test_a_killed_split_resumes(store, tmp_path):
     assert_same_files(out, tmp_path / "whole")
 
 
+def test_a_folder_of_datasets_names_them(store, tmp_path, capfd):
+    """An earlier message called the folder an unfinished dataset."""
+    out = tmp_path / "parts"
+    write_split(store, out, test=0.2, seed=3)
+    assert run(["inspect", str(out)]) == 2
+    wanted = f"sainet: {out}: not a dataset; give {out}/test or {out}/train.\n"
+    assert capfd.readouterr().err == wanted
+
+
 def test_the_command_prints_the_sizes(store, tmp_path, capfd):
     words = ["split", "--data", str(store.path), "--out", str(tmp_path / "out")]
     assert run([*words, "--test", "0.1", "--json"]) == 0

@@ -257,6 +257,9 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
                 f"{folder}: no such dataset; make one with 'sainet generate' or "
                 "'import'."
             )
+        inside = sorted(str(each.parent) for each in folder.glob(f"*/{schema.HASHES}"))
+        if inside and not (folder / schema.HASHES).exists():
+            raise BadStore(f"{folder}: not a dataset; give {' or '.join(inside[:2])}.")
         for name, why in _NEEDED.items():
             if not (folder / name).exists():
                 raise BadStore(f"{folder / name}: missing, so {why}.")
