@@ -263,13 +263,7 @@ def shown(*words):
 def test_train_and_tune_show_the_settings_of_their_recipes():
     assert "Gradient steps. (default: 10000)" in shown("train", "in")
     assert "1,200 from the engine, 300 from a network" in shown("tune", "in")
-
-
-def test_training_from_a_network_names_the_command_for_it(tmp_path):
-    words = ("train", "in", "--start-from", "in", "--data", tmp_path, "--out", "x")
-    error = sainet(*words, status=2).stderr
-    assert "--start-from is in" in error
-    assert "use 'sainet tune in --start in'" in error
+    assert "to train a network further, use 'sainet tune'" in shown("train")
 
 
 def test_a_network_is_tuned_and_an_engine_identified(pushes, tmp_path):

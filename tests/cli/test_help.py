@@ -20,14 +20,18 @@ COMMANDS = [
     "tune",
     "evaluate",
     "identify",
+    "cross-validate",
+    "propose",
     "control",
+    "play",
+    "record",
     "reproduce",
     "report",
     "bench",
 ]
 WIDTHS = (80, 120)
 FORBIDDEN = r"told|tells?|believes?|know(n|s)?|sees?|say|says|alone\."
-HEADING = re.compile(r"(-h, )?--[a-z]|[\[{]|[A-Z]{2}")
+HEADING = re.compile(r"(-h, )?--[a-z]|[\[{](?!\.)|[A-Z]{2}")
 
 
 def rendered(words, width, monkeypatch, capsys):
@@ -84,6 +88,14 @@ def test_every_option_shows_one_default_or_is_required_or_a_switch(shown):
         stated = len(re.findall(r"(?i)\bdefault: |\(required\)", option))
         switch = re.match(r"(-h, )?--[a-z-]+ [a-zA-Z]+ ?[a-z]", option)
         assert stated == 1 or (stated == 0 and switch), option
+
+
+def test_brackets_are_closed_before_a_default(shown):
+    for option in options(shown):
+        before = option.partition("(default: ")[0]
+        # Choices and numbers of values have brackets of their own.
+        text = re.sub(r"^\S+ (\[.*?\]|\{.*?\}|[A-Z|]+)+ ", "", before)
+        assert text.count("(") == text.count(")"), option
 
 
 def test_words_are_plain(shown):

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 class CrossValidate:
     """Find out from your pushes whether identification or learning is worth it.
 
-    Each push is predicted by models that were fitted without it. The verdict names the
-    model to use. Starting with the simplest, a model is replaced by the next one if
-    that has clearly smaller errors in every division into folds.
+    Each push is predicted by models that were fitted without it.
+
+    The verdict names the simplest model that no other model clearly improves on.
     """
 
     data: Path

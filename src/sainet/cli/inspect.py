@@ -17,7 +17,8 @@ class Inspect:
     """Summarise a dataset of pushes and name its doubtful recordings."""
 
     data: Positional[Path]
-    """Dataset: the folder of import, record, generate or split."""
+    """Dataset: the folder of import, generate or add-bystander, the folder dataset of
+    record, or the folder train or test of split."""
     out: Path | None = None
     """Page to write: summary, pictures and doubtful recordings in one .html file.
     Default: none."""

@@ -14,8 +14,7 @@ from sainet.runs.errors import require
 class Propose:
     """Propose the next pushes to record for a Gaussian process.
 
-    Each proposed push reduces the expected variance of predictions most, given the
-    pushes proposed before it.
+    Each push most reduces the variance left after the pushes proposed before it.
     """
 
     model: Positional[Path]

@@ -43,9 +43,6 @@ class Train:
     single_steps: bool = False
     """Train on single steps, each from the true state (the paper's figure 2c), instead
     of whole pushes."""
-    start_from: str | None = None
-    """Not an option of this command: use 'sainet tune --start' (default: random
-    weights)."""
     members: int | None = None
     """Number of networks in an ensemble, with consecutive seeds; their mean is the
     prediction, and their disagreement gives 90 % regions, calibrated on a fifth of the
@@ -56,16 +53,7 @@ class Train:
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
-        """Train the network and draw its learning curve.
-
-        Raises:
-            BadInput: a network to start from is given.
-        """
-        if self.start_from is not None:
-            raise BadInput(
-                f"`start_from` is {self.start_from}; 'sainet train' starts with random "
-                f"weights, use 'sainet tune {self.model} --start {self.start_from}'."
-            )
+        """Train the network and draw its learning curve."""
         recipe = self.recipe
         if self.single_steps:
             recipe = recipe.changed(horizon=SingleSteps(steps=recipe.horizon.steps))

@@ -42,8 +42,8 @@ class Changes:
     steps: int = RESIDUAL.horizon.steps
     """Steps of each push to train on, at most."""
     hold: int | None = None
-    """Zero-order-hold length for additive networks in training (steps; default: 8 from
-    the engine and with the features 'contact', 1 from a network)."""
+    """Zero-order-hold length for additive networks in training, in steps (default: 8
+    from the engine and with the features 'contact', 1 from a network)."""
     mirror: bool = RESIDUAL.augmentation.mirror
     """Do not mirror pushes. By default, about half of each batch is mirrored (not with
     the features 'place')."""

@@ -46,7 +46,8 @@ class RobotConfig:
     noise_level: NoiseLevel = "default"
     """Scale of the world's noise; paper-like is three times the default."""
     lab: int = 0
-    """Number of the virtual lab, whose hidden properties are drawn from it."""
+    """Number of the virtual lab, whose hidden properties are drawn from it; the studies
+    use labs 0 to 4."""
     surface: Surface = "abs"
     """Surface of the virtual lab: abs or plywood."""
     swapped: bool = False
