@@ -1,4 +1,4 @@
-"""Push the second disk to a goal with the SAIN that ships, in a simulated world."""
+"""Push the second disk to a goal with the shipped SAIN, in a simulated world."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -6,7 +6,7 @@ import numpy as np
 import sainet as sn
 from sainet.control.episode import ControlStep
 
-# The world: a rough table, noise, and a friction that is no input of the model.
+# The world: a rough table, noise, and a friction that is not an input of the model.
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059], table_friction=0.12)
 state = scene.in_a_row()
 engine, rng = sn.make_engine("planar"), np.random.default_rng(0)
@@ -17,8 +17,8 @@ robot = sn.SimulatedRobot(world, scene, state)
 task = sn.PushToGoal(state.position[1] + jnp.array([0.10, 0.02]))
 
 
-def tell(step: ControlStep) -> None:
-    """Say what was planned and how far the goal was."""
+def report(step: ControlStep) -> None:
+    """Print the planned push and the distance to the goal before it."""
     push = np.rad2deg(
         [step.plan.pushes[0].contact_angle, step.plan.pushes[0].direction]
     )
@@ -27,5 +27,5 @@ def tell(step: ControlStep) -> None:
 
 
 planner = sn.make_planner("greedy")
-episode = sn.run_episode(robot, planner, "sain", task, scene, on_step=tell)
+episode = sn.run_episode(robot, planner, "sain", task, scene, on_step=report)
 print(f"{episode.reason} after {len(episode.steps)} pushes")

@@ -10,7 +10,7 @@ env = RecordEpisodeStatistics(env)
 
 # The policy: SAIN predicts, the paper's greedy search plans. Its action is one of the
 # 72 pushes, as an index.
-planner = sn.GreedyPlanner(sn.load_model("sain"), env.unwrapped.task)
+planner = sn.GreedyPlanner(sn.load("sain"), env.unwrapped.task)
 policies = {
     "planner": planner.act,
     "random pushes": lambda observation: env.action_space.sample(),
