@@ -298,7 +298,7 @@ def test_damaged_chunks_with_matching_hashes_are_one_line(copy, damage):
 @pytest.mark.parametrize("name", ["/dev/zero", "../../../etc/passwd", "truth/other"])
 def test_the_list_of_hashes_names_files_of_the_dataset_only(copy, name):
     edit(copy / "hashes.json", lambda found: found["files"].update({name: "0" * 64}))
-    assert "is no file of this dataset" in refusal(copy)
+    assert "is not a file of this dataset" in refusal(copy)
 
 
 @pytest.mark.parametrize("name", [CHUNK, ATTRIBUTES, "hashes.json"])

@@ -71,6 +71,9 @@ class Pushes:
     def first(self, count: int) -> "Pushes":
         """Return only the first pushes.
 
+        Args:
+            count: their number, from 1.
+
         Raises:
             BadInput: there are fewer.
         """
@@ -79,13 +82,19 @@ class Pushes:
     def take(self, rows: Iterable[int] | Int[np.ndarray, " row"]) -> "Pushes":
         """Return only the pushes with these indices, in this order.
 
+        Args:
+            rows: whole numbers from 0, [row]; not a mask.
+
         Raises:
             BadInput: there is no push with one of them, or none was chosen.
         """
         return replace(self, store=self.store.take(rows))
 
     def of_group(self, name: str) -> "Pushes":
-        """Return the pushes of one group, a surface or a speed for example.
+        """Return the pushes of one group, or of all groups of one surface.
+
+        Args:
+            name: of the group, ``abs-10`` for example, or of the surface, ``abs``.
 
         Raises:
             BadInput: there is no such group.
@@ -99,7 +108,7 @@ class Pushes:
 
     @property
     def hashes(self) -> UInt64[np.ndarray, " push"]:
-        """The hash of each push: of its start and its command, in any dataset."""
+        """The hash of each push, of its start and its command, equal in any dataset."""
         return self.store.push_hashes()
 
     def batch(self, steps: int | None = None) -> PushBatch:

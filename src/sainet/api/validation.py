@@ -29,7 +29,7 @@ from sainet.studies.validation import cross_validate as validate
 class CrossValidation(ErrorTable):
     """Errors of models on pushes that they were not fitted to, and what to do.
 
-    `print` shows the table; `verdict()` says whether learning is worth it.
+    `print` shows the table; `verdict()` returns whether learning is worth it.
     """
 
     found: Validation
@@ -80,7 +80,7 @@ def cross_validate(
     Raises:
         BadStore: the pushes do not suffice for so many folds, or for a model.
         BadInput: the inputs of a model are the same in all pushes.
-        UnknownName: there is no model of a name.
+        UnknownName: no model has one of the names.
     """
     require_count("folds", folds, low=2)
     schemes: Sequence[Scheme] = (by,) if isinstance(by, str) else tuple(by)

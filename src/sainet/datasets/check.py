@@ -79,7 +79,9 @@ def check_files(folder: Path, info: StoreInfo, hashes: Hashes, *, verify: bool) 
         for index in range(info.chunks):
             wanted[chunk_file(name, variable, index)] = size
     if stray := sorted(hashes.keys() - wanted.keys()):
-        raise _damaged(folder, HASHES, f"{shown(stray[0])} is no file of this dataset")
+        raise _damaged(
+            folder, HASHES, f"{shown(stray[0])} is not a file of this dataset"
+        )
     for name, size in wanted.items():
         if name not in hashes:
             raise _damaged(folder, HASHES, f"{name} has no hash")

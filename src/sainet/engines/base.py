@@ -20,8 +20,17 @@ class AbstractEngine(eqx.Module):
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls (eq. 2: open loop).
 
-        All arguments share their leading batch axes. The final state is complete: two
-        consecutive rollouts equal one long rollout.
+        The final state is complete: two consecutive rollouts equal one long rollout.
+
+        Args:
+            scene: masses and radii [push, body] (kg, m); all arguments share their
+                leading axes.
+            initial: state before the first step, positions [push, body, 2] (m).
+            controls: of the pusher, [push, time, 2] (m, or N).
+
+        Returns:
+            Positions [push, time, body, 2] (m), and the other fields of a state, after
+            each step of ``scene.time_step`` seconds.
         """
 
     @property
@@ -81,7 +90,7 @@ class AssumedProperties(AbstractEngine):
         return self.engine.most_disks
 
     def rollout(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
-        """Roll the wrapped engine out in the assumed scene."""
+        """Return the states in the assumed scene; see `AbstractEngine.rollout`."""
         return self.engine.rollout(self.assume(scene), initial, controls)
 
 

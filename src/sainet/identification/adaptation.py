@@ -160,7 +160,11 @@ class Adaptation:
         self.found = Properties.none(scene.body_count)
 
     def add(self, recording: Recording) -> None:
-        """Remember a push; one whose end is unknown is left out."""
+        """Remember a push; one whose end is unknown is left out.
+
+        Args:
+            recording: of an executed push (s, m, rad).
+        """
         if recording.trouble:
             return
         push, sent = resample(recording), recording.commanded

@@ -56,7 +56,7 @@ class AbstractFeatures(ABC):
         return True
 
     def axes(self, frame: PushFrame) -> PushFrame:
-        """Return the frame in which the network sees a push: the push frame."""
+        """Return the frame of the inputs and outputs of a push: the push frame."""
         return frame
 
     @property
@@ -100,7 +100,7 @@ class FeatureSet(AbstractFeatures):
     has_bounds: bool = True  # of scaled inputs
 
     def axes(self, frame: PushFrame) -> PushFrame:
-        """Return the frame in which the network sees a push."""
+        """Return the frame of the inputs and outputs of a push."""
         return frame.along_table() if self.has_table_axes else frame
 
     @property

@@ -73,7 +73,11 @@ class Model:
         return (source.groups or ()) if source else ()
 
     def called(self, name: str) -> "Model":
-        """Return the model under another name in tables and JSON."""
+        """Return the model under another name in tables and JSON.
+
+        Args:
+            name: in the place of the model's own.
+        """
         if self.name == name:
             return self
         return replace(self, id=msgspec.structs.replace(self.id, name=name))

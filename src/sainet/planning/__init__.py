@@ -20,9 +20,10 @@ def make_planner(
     """Return a planner with its default settings.
 
     Args:
-        name: name of the planner.
+        name: `greedy` (the paper's search) or `tree` (every sequence of two pushes).
         deadline: time after which the best plan so far is used, s; only for `tree`.
-        expected: weigh the cost that is expected where the model is not sure.
+        expected: judge pushes by the mean cost over the regions of the model, a
+            Gaussian process or an ensemble.
 
     Raises:
         UnknownName: no planner has this name.

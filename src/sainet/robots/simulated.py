@@ -54,7 +54,7 @@ class SimulatedRobot(AbstractRobot):
         return self._truth
 
     def arrange(self, state: State) -> None:
-        """Put the disks and the pusher at these poses, at rest."""
+        """Put the disks and the pusher at these poses (m, rad), at rest."""
         self._truth = at_rest(state.position, state.angle, state.pusher_position)
 
     def resume(self, left: State | None, *seed: int) -> None:
@@ -72,7 +72,11 @@ class SimulatedRobot(AbstractRobot):
         return self._measured
 
     def push(self, push: Push) -> Recording:
-        """Push from where the disks were last measured; record measured poses."""
+        """Push from where the disks were last measured; record measured poses.
+
+        Args:
+            push: one push (rad, rad, m, m/s), without a batch axis.
+        """
         # In the engine's batches: one scene, one push.
         scene, measured, truth, one = jax.tree.map(
             lambda x: jnp.asarray(x)[None],

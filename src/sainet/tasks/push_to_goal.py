@@ -83,13 +83,20 @@ class PushToGoal(AbstractTask):
     def distance(self, state: State) -> Float[Array, "*batch"]:
         """Return the distance of the target disk from the goal (m).
 
+        Args:
+            state: of the disks; one distance for each state of a batch.
+
         Raises:
             BadScene: the scene has no disk with this index.
         """
         return norm(self._to_goal(self._moved(state)))
 
     def cost(self, state: State) -> Float[Array, "*batch"]:
-        """Return the paper's heuristic h(p_1, p_m, g), or that of a row (m)."""
+        """Return the paper's heuristic h(p_1, p_m, g), or that of a row (m).
+
+        Args:
+            state: of the disks; one cost for each state of a batch.
+        """
         distance, place = self.distance(state), state.position
         if self.steering is not None:
             row = place[..., : self.moved + 1, :]
@@ -117,7 +124,12 @@ class PushToGoal(AbstractTask):
         return replace(self, steering=found)
 
     def is_solved(self, scene: Scene, state: State) -> Bool[Array, "*batch"]:
-        """Return whether the target disk is within the tolerance of the goal."""
+        """Return whether the target disk is within the tolerance of the goal.
+
+        Args:
+            scene: with the radius of the target disk (m).
+            state: of the disks; one answer for each state of a batch.
+        """
         return self.distance(state) <= self.tolerance * scene.radius[..., self.moved]
 
     def _moved(self, state: State) -> Float[Array, "*batch 2"]:

@@ -59,7 +59,7 @@ class RobotSetup(AbstractSetup):
     """The pusher follows a path at constant speed, then holds."""
 
     def steps(self, stroke: Pushes, speed: Pushes) -> Counts:
-        """Return the steps of motion and of holding, rounded up to whole buckets."""
+        """Return the steps of motion and of holding: a multiple of 40, rounded up."""
         # A hair less than exact: 48.0000001 steps of motion are 48.
         moving = np.ceil(stroke / speed / TIME_STEP - 1e-6)
         whole = moving + self.config.hold_steps

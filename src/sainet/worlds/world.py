@@ -70,6 +70,10 @@ class SimulatedWorld:
     def capture(
         self, poses: Float[np.ndarray, "push time body 3"]
     ) -> Float[np.ndarray, "push time body 3"]:
-        """Return measured poses (m, m, rad)."""
+        """Return measured poses (m, m, rad).
+
+        Args:
+            poses: true poses (m, m, rad).
+        """
         error = capture_error(self.rng, poses.shape[:3], self.noise)
         return poses + error.astype(self.precision)

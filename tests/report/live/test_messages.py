@@ -71,7 +71,7 @@ def test_hostile_messages_are_refused_in_one_printable_line(text):
         ({"disk": "one"}, "disk must be a whole number"),
         ({"x_mm": 1e6}, "x_mm must be at most 10000"),
         ({"y_mm": None}, "y_mm must be a number"),
-        ({"z_mm": 1}, "z_mm is no field of such messages"),
+        ({"z_mm": 1}, "z_mm is not a field of such messages"),
         ({"type": "disc"}, "there is no type 'disc'"),
     ],
 )

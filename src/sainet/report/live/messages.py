@@ -15,7 +15,7 @@ _LONGEST_REASON = 160  # characters
 # Errors of msgspec, in words.
 _WORDS = {
     "Object missing required field `(.+)`": "{value} is missing",
-    "Object contains unknown field `(.+)`": "{value} is no field of such messages",
+    "Object contains unknown field `(.+)`": "{value} is not a field of such messages",
     "Invalid (?:enum )?value (.+)": "there is no {field} {value}",
     r"Expected `\w+` >= (.+)": "{field} must be at least {value}",
     r"Expected `\w+` <= (.+)": "{field} must be at most {value}",
