@@ -35,16 +35,8 @@ def disk(
     axes: Axes, centre: Point, radius: float, color: str, *, ghost: bool = False
 ) -> None:
     """Draw a disk; a ghost is an outline."""
-    axes.add_patch(
-        Circle(
-            centre,
-            radius,
-            facecolor="none" if ghost else color,
-            edgecolor=color,
-            alpha=1.0 if ghost else 0.32,
-            linewidth=1.2,
-        )
-    )
+    face, alpha = ("none", 1.0) if ghost else (color, 0.32)
+    axes.add_patch(Circle(centre, radius, fc=face, ec=color, alpha=alpha, lw=1.2))
     if not ghost:
         axes.add_patch(Circle(centre, radius, fill=False, edgecolor=color, lw=1.4))
 
@@ -59,19 +51,10 @@ def arrow(
     dashed: bool = False,
 ) -> None:
     """Draw an arrow from a point to a point."""
-    axes.add_patch(
-        FancyArrowPatch(
-            start,
-            end,
-            arrowstyle="-|>",
-            mutation_scale=11,
-            shrinkA=0,
-            shrinkB=0,
-            color=color,
-            linewidth=width,
-            linestyle="--" if dashed else "-",
-        )
-    )
+    ends = {"shrinkA": 0, "shrinkB": 0}
+    shape = FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=11, **ends)
+    shape.set(color=color, linewidth=width, linestyle="--" if dashed else "-")
+    axes.add_patch(shape)
 
 
 def line(axes: Axes, start: Point, end: Point, color: str = FAINT) -> None:
@@ -83,18 +66,9 @@ def arc(
     axes: Axes, centre: Point, radius: float, degrees: Point, color: str = INK
 ) -> None:
     """Draw an arc between two angles, counter-clockwise."""
-    size = 2 * radius
-    axes.add_patch(
-        Arc(
-            centre,
-            size,
-            size,
-            theta1=degrees[0],
-            theta2=degrees[1],
-            color=color,
-            linewidth=1.3,
-        )
-    )
+    size, (first, last) = 2 * radius, degrees
+    shape = Arc(centre, size, size, theta1=first, theta2=last, color=color, lw=1.3)
+    axes.add_patch(shape)
 
 
 def note(
@@ -108,29 +82,17 @@ def note(
     bold: bool = False,
 ) -> None:
     """Write a short text at a point."""
+    weight = "bold" if bold else "normal"
     axes.text(
-        *place,
-        text,
-        color=color,
-        fontsize=size,
-        ha=align,
-        va="center",
-        fontweight="bold" if bold else "normal",
+        *place, text, color=color, size=size, weight=weight, ha=align, va="center"
     )
 
 
 def box(axes: Axes, corner: Point, size: Point, color: str) -> None:
     """Draw a rounded box with a coloured edge."""
-    axes.add_patch(
-        FancyBboxPatch(
-            corner,
-            *size,
-            boxstyle="round,pad=0,rounding_size=0.12",
-            facecolor=color + "1c",
-            edgecolor=color,
-            linewidth=1.3,
-        )
-    )
+    shape = FancyBboxPatch(corner, *size, boxstyle="round,pad=0,rounding_size=0.12")
+    shape.set(facecolor=color + "1c", edgecolor=color, linewidth=1.3)
+    axes.add_patch(shape)
 
 
 def polar(centre: Point, radius: float, degrees: float) -> Point:
