@@ -1,14 +1,13 @@
 """`sainet tune`."""
 
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Literal
 
 from tyro.conf import Positional
 
 from sainet.cli.output import Json, Output
 from sainet.cli.process import ProcessJob, for_networks
-from sainet.cli.train import Job, only
+from sainet.cli.train import Training, only
 from sainet.learning.recipes import FROM_ENGINE, RESIDUAL, recipe_for, start_named
 from sainet.models.identity import Features, ModelKind, ProcessFeatures
 
@@ -70,17 +69,12 @@ class Changes:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tune:
+class Tune(Training):
     """Train a network, or fit a Gaussian process, on few pushes."""
 
     model: Positional[ModelKind | Literal["gp"]]
     """Network: in (without an engine) or sain (around an engine). gp: a Gaussian
     process around an engine, for pushes of one or two disks."""
-    data: tuple[Path, ...]
-    """Dataset to train on. Several datasets, with different numbers of disks, train one
-    network."""
-    out: Path
-    """Run folder; identical settings resume."""
     start: str = FROM_ENGINE
     """Start of training. engine: an additive network, whose output is added to the
     internal engine's acceleration and is zero at first. Otherwise a shipped network, or
@@ -90,17 +84,7 @@ class Tune:
     simulator whose prediction the dataset contains (default: planar, with the masses
     and radii of the paper's disks, for SAIN; gp identifies the engine on the same
     pushes)."""
-    group: str | None = None
-    """Group of pushes to train on, or surface (default: all groups)."""
-    pushes: int | None = None
-    """Pushes to train on, from the start of the dataset (default: all)."""
-    members: int | None = None
-    """Number of networks in an ensemble, with consecutive seeds; their mean is the
-    prediction, and their disagreement gives 90 % regions, calibrated on a fifth of the
-    pushes (default: a single network, without regions)."""
     changes: Changes = field(default_factory=Changes)
-    devices: int | None = None
-    """CPU devices to split each batch over (default: one per core)."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:
@@ -113,12 +97,4 @@ class Tune:
             return ProcessJob(*job).run(given, asdict(Changes()), self.output)
         recipe = recipe_for(start_named(self.start), self.changes.features)
         recipe = recipe.changed(**for_networks(given))
-        return Job(
-            self.model,
-            self.data,
-            self.out,
-            self.engine or "planar",
-            group=self.group,
-            pushes=self.pushes,
-            members=self.members,
-        ).run(recipe, self.devices, self.output)
+        return self.fit(self.model, self.engine or "planar", recipe, self.output)

@@ -51,8 +51,9 @@ def arrow(
     dashed: bool = False,
 ) -> None:
     """Draw an arrow from a point to a point."""
-    ends = {"shrinkA": 0, "shrinkB": 0}
-    shape = FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=11, **ends)
+    shape = FancyArrowPatch(
+        start, end, arrowstyle="-|>", mutation_scale=11, shrinkA=0, shrinkB=0
+    )
     shape.set(color=color, linewidth=width, linestyle="--" if dashed else "-")
     axes.add_patch(shape)
 
