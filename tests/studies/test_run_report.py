@@ -32,6 +32,21 @@ def test_a_training_run_has_its_card_and_curve(tmp_path):
         assert told in page
 
 
+@pytest.mark.parametrize(
+    ("file", "way_out"),
+    [
+        ("hashes.json", "; 'sainet inspect {}' describes its pushes."),
+        ("report.html", "; open {}/report.html."),
+    ],
+)
+def test_a_folder_that_another_page_shows_names_it(file, way_out, tmp_path):
+    (tmp_path / file).touch()
+    with pytest.raises(BadInput) as caught:
+        report_of(tmp_path)
+    wanted = f"{tmp_path}: nothing to show in it{way_out.format(tmp_path)}"
+    assert str(caught.value) == wanted
+
+
 def test_errors_episodes_and_figures_come_together(tmp_path):
     write_json(tmp_path / "config.json", {"command": "control", "seed": 3})
     write_document(tmp_path / TABLE, Result(summary=samples.result()))

@@ -143,8 +143,8 @@ def open_pushes(path: Path | str) -> Pushes:
     """Return the pushes of a dataset after checking that it is whole.
 
     Args:
-        path: folder that `sainet import`, `sainet record`, `sainet generate` or
-            `sainet.generate` made.
+        path: folder that `sainet import`, `sainet generate` or `sainet.generate` made,
+            `dataset` of `sainet record`, or `train` or `test` of `sainet split`.
 
     Raises:
         BadStore: the dataset is missing, unfinished, damaged or of another format.

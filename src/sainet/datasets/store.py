@@ -244,7 +244,8 @@ def open_store(path: Path | str, *, verify: bool = True) -> Store:
     Values are checked when they are read.
 
     Args:
-        path: folder made by `sainet generate`, `import`, `split` or `record`.
+        path: folder that `sainet generate`, `import` or `add-bystander` made, `dataset`
+            of `record`, or `train` or `test` of `split`.
         verify: whether to compare every file with its hash.
 
     Raises:

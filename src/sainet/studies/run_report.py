@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from sainet.control.record import episode_files, read_record
+from sainet.datasets.schema import HASHES
 from sainet.models.card import CARD, IDENTIFIED, Identified, read_identified
 from sainet.report.about_models import read_any_card, sentences_of
 from sainet.report.pages.page import REPORT, Report, to_page
@@ -115,7 +116,11 @@ def _estimates(identified: Identified) -> Iterator[str]:
 
 
 def _way_out(folder: Path) -> str:
-    """Name folders in it that have something to show."""
+    """Name what shows the folder, or folders in it that have something to show."""
+    if (folder / REPORT).is_file():
+        return f"; open {folder / REPORT}"
+    if (folder / HASHES).is_file():
+        return f"; 'sainet inspect {shlex.quote(str(folder))}' describes its pushes"
     known = sorted(path.parent for path in folder.glob(f"*/{TABLE}"))
     known += sorted(path.parent for path in folder.glob(f"*/{CARD}"))
     return f"; give, for example, {known[0]}" if known else ""
