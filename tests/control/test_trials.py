@@ -17,6 +17,7 @@ import pytest
 from models.samples import identified_folder
 from models.test_checkpoint import write_network
 from report import samples
+from sainet.control import record as records
 from sainet.control import trials
 from sainet.control.config import ControlConfig
 from sainet.control.record import SUMMARY, episode_file
@@ -224,6 +225,17 @@ def test_an_error_keeps_the_pushes_and_asks_the_robot_nothing_more(
         2,
     )
     assert not episode_file(tmp_path / "out", 0).exists()
+
+
+def test_recorded_poses_are_a_thirtieth_of_a_second_apart_at_any_rate():
+    rate, rest = 114.0, np.zeros((80, 2))
+    time = np.arange(80) / rate
+    pose = np.zeros((80, 2, 3))
+    pose[..., 0] = time[:, None]
+    found, _ = records._drawn(Recording(time=time, pose=pose, pusher=rest))  # noqa: SLF001
+    wanted = np.arange(1, len(found) + 1) / 30
+    assert len(found) == int(time[-1] * 30)
+    assert np.abs(found[:, 0, 0] - wanted).max() < 1 / rate
 
 
 _TELLING = """

@@ -22,7 +22,7 @@ from sainet.runs.errors import BadInput
 from sainet.scenes.pushes import Push
 from sainet.scenes.quantities import PUSHER_RADIUS, Finite, Mass, Radius
 from sainet.scenes.recording import Conditions, Recording
-from sainet.scenes.state import State, at_rest
+from sainet.scenes.state import State, at_rest, poses_of
 
 _Known = Finite | None  # None: unknown
 _Pose = Annotated[list[_Known], msgspec.Meta(min_length=3, max_length=3)]
@@ -60,8 +60,7 @@ class Place(msgspec.Struct, frozen=True, kw_only=True):
     @classmethod
     def of(cls, state: State) -> "Place":
         """Return the poses of a state."""
-        pose = np.column_stack([state.position, state.angle])
-        return cls(pose=listed(pose), pusher=listed(state.pusher_position))
+        return cls(pose=listed(poses_of(state)), pusher=listed(state.pusher_position))
 
     def state(self) -> State:
         """Return the state at rest."""

@@ -18,11 +18,12 @@ from sainet.runs.errors import BadInput, shown
 from sainet.runs.folders import remake
 from sainet.scenes import quantities
 from sainet.scenes.recording import Recording
-from sainet.scenes.state import State
+from sainet.scenes.scene import TIME_STEP
+from sainet.scenes.state import State, poses_of
 
 SUMMARY = "episodes.json"
 FOLDER = "episodes"
-_EVERY = 8  # steps between the recorded poses of a path: 1/30 s
+_EVERY = 8  # steps of 1/240 s between the recorded poses of a path: 1/30 s
 
 _LEAST_MM = 1e-6  # length of a way
 _agree = functools.partial(math.isclose, rel_tol=1e-5, abs_tol=0.05)  # mm
@@ -240,20 +241,15 @@ def record_step(trial: Trial, step: ControlStep) -> StepRecord:
 
 
 def _drawn(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """Return some poses of the disks, and the pusher at their times."""
-    pose, pusher = recording.pose, recording.pusher
+    """Return the poses of the disks every 1/30 s, and the pusher at their times."""
+    time, pose, pusher = recording.time, recording.pose, recording.pusher
     known = np.isfinite(pose).all(axis=(1, 2))
     if not known.all() and known.any():  # the disks have a clock of their own
-        pose = pose[known]
-        pusher = pusher_track(recording).at(recording.time[known])
-    return pose[_EVERY::_EVERY], pusher[_EVERY::_EVERY]
-
-
-def poses_of(state: State) -> np.ndarray:
-    """Return the pose of each disk, ``[body, 3]`` (m, m, rad)."""
-    return np.concatenate(
-        [np.asarray(state.position), np.asarray(state.angle)[..., None]], axis=-1
-    )
+        time, pose = time[known], pose[known]
+        pusher = pusher_track(recording).at(time)
+    steps = (time - time[:1]) / TIME_STEP + 0.5  # half a step early is in time
+    rows = np.searchsorted(steps, np.arange(_EVERY, steps.max(initial=0.0), _EVERY))
+    return pose[rows], pusher[rows]
 
 
 def _known(value: float) -> float | None:

@@ -5,7 +5,6 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from sainet.control.config import ControlConfig
 from sainet.engines.simulator import PAPER_FRICTION, PAPER_MASS, PAPER_RADIUS
@@ -14,7 +13,7 @@ from sainet.robots.changing import changing_robot
 from sainet.robots.simulated import scene_of
 from sainet.scenes.pushes import push_axis
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State
+from sainet.scenes.state import at_rest
 from sainet.tasks.obstacles import Way, draw_obstacles
 from sainet.tasks.push_to_goal import PushToGoal, draw_goal
 from sainet.worlds.sampling import scattered
@@ -62,7 +61,8 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
         row = np.asarray(state.position)[: -config.obstacles]
         way, radius = Way(moved, goal), np.asarray(true.radius)
         others = draw_obstacles(config.seed, index, way, row, radius)
-        robot.arrange(_with_last(state, others))
+        place = state.position.at[-config.obstacles :].set(others)
+        robot.arrange(at_rest(place, state.angle, state.pusher_position))
         robot.observe()
     task = PushToGoal(
         jnp.asarray(goal, jnp.float32), moved, config.tolerance, config.alignment
@@ -71,12 +71,6 @@ def with_goal(config: ControlConfig, index: int, robot: AbstractRobot) -> Trial:
     if config.given_properties == "assumed":
         given = scene_of(PAPER_MASS, PAPER_RADIUS, config.disks, PAPER_FRICTION)
     return Trial(robot, task, wrong_by(given, config, index))
-
-
-def _with_last(state: State, position: Float[np.ndarray, "disk 2"]) -> State:
-    """Return a state whose last disks are elsewhere."""
-    moved = state.position.at[-len(position) :].set(position)
-    return eqx.tree_at(lambda s: s.position, state, moved)
 
 
 def wrong_by(scene: Scene, config: ControlConfig, index: int) -> Scene:

@@ -3,12 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from sainet.control.record import EpisodeRecord, StepRecord
+from sainet.control.record import EpisodeRecord
 from sainet.models.identity import ModelId
 from sainet.report.palette import style_of
 
@@ -101,22 +100,22 @@ class EpisodeFrames:
     @cached_property
     def starts(self) -> list[int]:
         """The frame at which each push starts."""
-        lengths = [1 + len(self._shown(step.actual)) for step in self._steps]
+        lengths = [1 + len(s.actual[:_FRAMES_OF_PUSH]) for s in self.record.steps]
         return [0, *np.cumsum(lengths).tolist()][: len(lengths)]
 
     @cached_property
     def poses(self) -> Float[np.ndarray, "frame body 3"]:
         """The pose of each disk (mm, mm, degrees)."""
-        if not self._steps:
+        if not self.record.steps:
             return np.asarray([self.record.final], float)
-        parts = [[step.observed, *self._shown(step.actual)] for step in self._steps]
+        parts = [[s.observed, *s.actual[:_FRAMES_OF_PUSH]] for s in self.record.steps]
         return np.concatenate([np.asarray(part, float) for part in parts])
 
     @cached_property
     def pusher(self) -> Float[np.ndarray, "frame 2"]:
         """The centre of the pusher (mm); NaN where there is no push."""
         unknown = [[np.nan, np.nan]]
-        parts = [self._shown(step.pusher) for step in self._steps] or [[]]
+        parts = [s.pusher[:_FRAMES_OF_PUSH] for s in self.record.steps] or [[]]
         # While the disks are observed, the pusher is at the start of its push.
         parts = [[*(part[:1] or unknown), *part] for part in parts]
         return np.concatenate([np.asarray(part, float) for part in parts])
@@ -125,7 +124,7 @@ class EpisodeFrames:
     def plans(self) -> list[Float[np.ndarray, "point body 2"]]:
         """The planned path of the disks' centres at each decision (mm)."""
         shape = (-1, len(self.record.radius_mm), 3)
-        paths = [np.asarray(s.planned, float).reshape(shape) for s in self._steps]
+        paths = [np.asarray(s.planned, float).reshape(shape) for s in self.record.steps]
         return [
             np.concatenate([path[::_STRIDE, :, :2], path[-1:, :, :2]]) for path in paths
         ]
@@ -133,20 +132,12 @@ class EpisodeFrames:
     @property
     def distances(self) -> list[float]:
         """The distance from the goal before each push, and at the end (mm)."""
-        measured = [step.distance_mm for step in self._steps]
+        measured = [step.distance_mm for step in self.record.steps]
         return np.asarray([*measured, self.record.final_mm], float).tolist()
 
     def turn_at(self, frame: int) -> int:
         """Return the index of the current push; -1 before the first."""
         return int(np.searchsorted(self.starts, frame, side="right")) - 1
-
-    @property
-    def _steps(self) -> list[StepRecord]:
-        return self.record.steps
-
-    @staticmethod
-    def _shown(path: list[Any]) -> list[Any]:
-        return path[:_FRAMES_OF_PUSH]
 
 
 def episode_title(record: EpisodeRecord) -> str:

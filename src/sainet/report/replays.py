@@ -10,7 +10,7 @@ from sainet.datasets.store import Store
 from sainet.models.dynamics import predict
 from sainet.models.model import Model
 from sainet.report.episode_frames import EndRegion, Replay, Track
-from sainet.scenes.state import State, Trajectory, pack_motion
+from sainet.scenes.state import Trajectory, poses_of
 
 
 def build_replay(
@@ -31,7 +31,7 @@ def build_replay(
     pusher = _with_start(
         batch.initial.pusher_position, arrays["truth_pusher"][:, :steps]
     )
-    motion = _with_start(_pose(batch.initial), np.asarray(batch.truth[..., :3]))
+    motion = _with_start(poses_of(batch.initial), np.asarray(batch.truth[..., :3]))
     tracks = {"truth": Track(motion[..., :2], motion[..., 2], pusher)}
     tracks |= {model.name: _track(model, batch) for model in models}
     return Replay(
@@ -75,7 +75,7 @@ def _predict(model: Model, batch: PushBatch) -> Trajectory:
 def _track(model: Model, batch: PushBatch) -> Track:
     """Return the track of a single push, with the region of its end if there is one."""
     states = _predict(model, batch).states
-    motion = _with_start(_pose(batch.initial), _pose(states))
+    motion = _with_start(poses_of(batch.initial), poses_of(states))
     start = batch.initial.pusher_position
     pusher = _with_start(start, np.asarray(states.pusher_position))
     region = model.dynamics.region(batch.scene, batch.initial, batch.controls)
@@ -84,10 +84,6 @@ def _track(model: Model, batch: PushBatch) -> Track:
         axes, turn = np.asarray(region.axes[0]), np.asarray(region.turn[0])
         end = EndRegion(heading=float(region.heading[0]), axes=axes, turn=turn)
     return Track(motion[..., :2], motion[..., 2], pusher, end)
-
-
-def _pose(state: State) -> np.ndarray:
-    return np.asarray(pack_motion(state)[..., :3])
 
 
 def _with_start(start: object, rest: np.ndarray) -> np.ndarray:

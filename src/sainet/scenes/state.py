@@ -153,6 +153,11 @@ def in_a_row(radius: Float[Array | np.ndarray, "*batch body"]) -> State:
     )
 
 
+def poses_of(state: State) -> Float[np.ndarray, "*batch body 3"]:
+    """Return the poses (m, m, rad) as an array of NumPy."""
+    return np.concatenate([state.position, state.angle[..., None]], axis=-1)
+
+
 def pack_motion(state: State) -> Float[Array, "*batch body 6"]:
     """Return x, y, angle and their rates of each disk in one array.
 

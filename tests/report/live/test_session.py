@@ -10,7 +10,6 @@ import pytest
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import run_episode
-from sainet.control.record import poses_of
 from sainet.control.trial import make_trial
 from sainet.models.library import load_model
 from sainet.planning import make_planner
@@ -34,6 +33,7 @@ from sainet.report.live.session import Session
 from sainet.report.live.views import Moved
 from sainet.robots import make_robot
 from sainet.runs.errors import BadInput, BadSetting, RunConflict
+from sainet.scenes.state import poses_of
 from sainet.studies.run_report import page_of
 
 SEED = 3

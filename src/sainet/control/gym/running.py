@@ -8,9 +8,9 @@ from jaxtyping import Float
 from sainet.control.episode import MOST_TROUBLES, checked
 from sainet.control.gym.raster import Goal, Picture, View, draw
 from sainet.control.gym.task import Observation, observation_of
-from sainet.control.record import poses_of
 from sainet.control.trial import Trial
 from sainet.scenes.pushes import Push
+from sainet.scenes.state import poses_of
 
 
 @dataclass

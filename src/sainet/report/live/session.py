@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from sainet.control.config import ControlConfig
 from sainet.control.episode import ControlStep, Episode, checked
-from sainet.control.record import poses_of, record_step
+from sainet.control.record import record_step
 from sainet.control.trial import Trial, with_goal
 from sainet.control.worlds import in_world, world_of
 from sainet.models.library import Model, load_model
@@ -39,6 +39,7 @@ from sainet.report.live.workshop import OnStatus, Workshop
 from sainet.report.live.world import Properties, make_world
 from sainet.scenes.pushes import Push
 from sainet.scenes.scene import TIME_STEP
+from sainet.scenes.state import poses_of
 
 Answer = View | Ghosts | Moved | Notice
 _MOST_PUSHES = 200  # of an episode
@@ -288,10 +289,8 @@ class Session:
         return self.predictor.models[self._control.model]
 
 
-def _new_trial(
-    control: ControlConfig, properties: Properties | None, index: int
-) -> Trial:
-    return with_goal(control, index, make_world(control, properties, index))
+def _new_trial(control: ControlConfig, own: Properties | None, index: int) -> Trial:
+    return with_goal(control, index, make_world(control, own, index))
 
 
 def _loaded(name: str) -> Model:

@@ -8,11 +8,12 @@ import numpy as np
 from jaxtyping import Float
 
 from sainet.control.config import ControlConfig
-from sainet.control.record import StepRecord, listed_poses, poses_of
+from sainet.control.record import StepRecord, listed_poses
 from sainet.control.trial import Trial
 from sainet.control.worlds import WorldName, world_of
 from sainet.report.live.predictions import STROKE, Difference, Path
 from sainet.report.live.table import Table
+from sainet.scenes.state import poses_of
 from sainet.worlds.noise import NoiseLevel
 
 Pose = list[float | None]  # x, y, angle

@@ -10,11 +10,11 @@ from jaxtyping import Float
 
 from sainet.robots.wire.arm import Stroke
 from sainet.robots.wire.cell import Cell, Disk
-from sainet.robots.wire.disks import REST, Measurement, Poses, moved, unrest
+from sainet.robots.wire.disks import REST, Measurement, moved, unrest
 from sainet.robots.wire.route import Route
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Conditions, Recording
-from sainet.scenes.state import State
+from sainet.scenes.state import State, poses_of
 
 _STILL = 5e-4  # m, that a disk moves which was not pushed
 _DISTURBED = 2e-3  # m, that a disk moved before the push
@@ -128,12 +128,6 @@ def tracker_times(found: Sequence[Measurement]) -> Float[np.ndarray, " frame"]:
         return time
     slope, start = np.polyfit(number - number[0], time - time[0], 1)
     return time[0] + start + slope * (number - number[0])
-
-
-def poses_of(state: State) -> Poses:
-    """Return the poses of one state."""
-    angle = np.asarray(state.angle, float)[:, None]
-    return np.concatenate([np.asarray(state.position, float), angle], axis=1)
 
 
 def _conditions(cell: Cell, push: Push) -> Conditions:
