@@ -227,6 +227,31 @@ def test_an_error_keeps_the_pushes_and_asks_the_robot_nothing_more(
     assert not episode_file(tmp_path / "out", 0).exists()
 
 
+def test_ctrl_c_keeps_the_pushes_of_a_robot_that_cannot_observe_any_more(
+    tmp_path, monkeypatch
+):
+    push, truth, done = SimulatedRobot.push, SimulatedRobot.truth, []
+
+    def end(self, wanted):
+        if done:
+            done.append(KeyboardInterrupt())
+            raise done[-1]
+        done.append(push(self, wanted))
+        return done[-1]
+
+    def lose(self):
+        if len(done) > 1:
+            raise SainetError("the disks cannot be measured at rest.")
+        return truth.fget(self)
+
+    monkeypatch.setattr(SimulatedRobot, "push", end)
+    monkeypatch.setattr(SimulatedRobot, "truth", property(lose))
+    with pytest.raises(KeyboardInterrupt):
+        run_trials(replace(CONFIG, pushes=5), tmp_path / "out")
+    left = json.loads((tmp_path / "out/episodes/000.interrupted.json").read_text())
+    assert (left["reason"], left["pushes"]) == ("interrupted", 1)
+
+
 def test_recorded_poses_are_a_thirtieth_of_a_second_apart_at_any_rate():
     rate, rest = 114.0, np.zeros((80, 2))
     time = np.arange(80) / rate

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -86,13 +87,12 @@ def run_trials(
         shards.tell(len(missing), config.trials)
     for index in each_done(executor, run_trial, missing):
         on_episode(read_record(files[index]))
-    records = [read_record(path) for path in files]
-    names = [path.relative_to(out).as_posix() for path in files]
     if shards is not None:
         shards.clear()
     if not folder.is_finished:
+        names = [path.relative_to(out).as_posix() for path in files]
         write_document(folder.path / SUMMARY, Finished(names))
-    return records
+    return [read_record(path) for path in files]
 
 
 def _with_model(
@@ -173,9 +173,13 @@ def run_trial(
         except (KeyboardInterrupt, SainetError) as error:
             episode.reason = str(error) or episode.reason
             left = path.with_suffix(".interrupted.json")
+            end = episode.final
             # A robot that cannot observe must not be asked where the disks are now.
-            end = episode.final if isinstance(error, SainetError) else None
-            write_document(left, record(config, index, trial, episode, end))
+            if isinstance(error, KeyboardInterrupt):
+                with suppress(SainetError):
+                    end = robot.truth
+            if end is not None:
+                write_document(left, record(config, index, trial, episode, end))
             raise
     write_document(path, record(config, index, trial, episode))
     path.with_suffix(".interrupted.json").unlink(missing_ok=True)
