@@ -301,3 +301,11 @@ def test_a_state_is_made_of_lists():
         np.testing.assert_array_equal(found, same)
     moved = sn.load("physics").predict(SCENE, state, sn.Push(0.0), steps=20).final
     assert moved.position[0, 0] > 0.001
+
+
+@pytest.mark.parametrize("name", ["physics", "sain"])
+def test_controls_without_steps_are_refused(name):
+    state = SCENE.in_a_row()
+    none = sn.PathControls(jnp.zeros((0, 2)), jnp.zeros((0, 2)))
+    with pytest.raises(BadScene, match="push: the controls have no steps; give at"):
+        sn.load(name).predict(SCENE, state, none)

@@ -11,7 +11,9 @@ from sainet.engines import make_engine
 from sainet.models.dynamics import PhysicsDynamics
 from sainet.planning.levels import roll_pushes
 from sainet.robots.simulated import SimulatedRobot
+from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import PushGrid
+from sainet.scenes.state import at_rest
 from sainet.worlds.noise import NoiseConfig, at_level
 from sainet.worlds.setups import RobotSetup
 from sainet.worlds.world import SimulatedWorld
@@ -62,8 +64,27 @@ def test_equal_seeds_give_equal_worlds():
 def test_a_push_that_moves_nothing_is_reported():
     made = robot()
     made.observe()
-    short = eqx.tree_at(lambda p: p.length, PUSH, jnp.float32(1e-6))
+    short = eqx.tree_at(lambda p: (p.length, p.speed), PUSH, (jnp.float32(1e-4),) * 2)
     assert made.push(short).trouble == "disk 1 did not move"
+
+
+@pytest.mark.parametrize(("name", "value"), [("length", np.nan), ("speed", 0.0)])
+def test_a_push_out_of_range_is_refused_and_moves_nothing(name, value):
+    made = robot()
+    before = made.observe()
+    bad = eqx.tree_at(lambda p: getattr(p, name), PUSH, jnp.float32(value))
+    with pytest.raises(BadScene, match=f"push: {name} is {value:g}"):
+        made.push(bad)
+    np.testing.assert_array_equal(made.truth.position, before.position)
+
+
+def test_a_push_begins_where_the_disks_were_arranged():
+    made = robot()
+    seen = made.observe()
+    place = seen.position + 0.3
+    made.arrange(at_rest(place, seen.angle, seen.pusher_position))
+    assert made.push(PUSH).trouble == ""
+    assert np.linalg.norm(made.truth.position[0] - place[0]) > 5e-3
 
 
 def test_a_push_that_starts_inside_a_disk_is_reported():

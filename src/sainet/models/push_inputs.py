@@ -10,19 +10,12 @@ import numpy as np
 from sainet.models.dynamics import AbstractDynamics, predict
 from sainet.runs.errors import BadScene, require
 from sainet.scenes.controls import Controls, PathControls
-from sainet.scenes.pushes import Push, PushGrid, command_path
-from sainet.scenes.quantities import CONTACT_ANGLE, DIRECTION, SPEED, STROKE
+from sainet.scenes.pushes import Push, PushGrid, check_push, command_path
 from sainet.scenes.scene import TIME_STEP, Scene
 from sainet.scenes.state import State, Trajectory, is_traced
 from sainet.worlds.setups import RobotSetup
 
 _USUAL_STEPS = 200  # of pushes whose length or speed is traced, and of no push
-_PARAMETERS = {
-    "contact_angle": CONTACT_ANGLE,
-    "direction": DIRECTION,
-    "length": STROKE,
-    "speed": SPEED,
-}
 _PARTS = {
     "scene": (Scene, "a Scene, for example of Scene.disks"),
     "state": (State, "a State, for example of scene.in_a_row() or at_rest"),
@@ -57,10 +50,7 @@ def untrained(push: Push, *names: str) -> list[str]:
 
 def steps_of(push: Push, time_step: float) -> int:
     """Return the steps until every push has ended and the disks rest."""
-    for name, quantity in _PARAMETERS.items():
-        value = getattr(push, name)
-        if not is_traced(value):
-            quantity.check(value, f"push: {name}", error=BadScene)
+    check_push(push)
     if is_traced((push.length, push.speed)) or not push.length.size:
         return _USUAL_STEPS
     # Single-precision numbers as they were meant: 0.05, not 0.0500000007.
@@ -76,7 +66,9 @@ def kind_of(push: Push | Controls) -> str:
 
 
 def check_axes(scene: Scene, state: State, push: Push | Controls) -> None:
-    """Raise `BadScene` unless scene, state and push have equal or no leading axes."""
+    """Raise `BadScene` for unequal leading axes, or controls that have no steps."""
+    if not (isinstance(push, Push) or push.steps):
+        raise BadScene("push: the controls have no steps; give at least one.")
     names = ", ".join(map(str, _axes(scene, state, push)))
     if max(map(len, _axes(scene, state, push))) > 1:
         raise BadScene(

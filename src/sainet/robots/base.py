@@ -59,4 +59,7 @@ class AbstractRobot(ABC):
 
         Returns:
             A recording with the commanded push; its first sample is the start.
+
+        Raises:
+            BadScene: the push is out of range; nothing was moved.
         """

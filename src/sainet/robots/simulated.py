@@ -11,10 +11,10 @@ from jaxtyping import Float
 from sainet.engines import make_engine
 from sainet.robots import RobotConfig
 from sainet.robots.base import AbstractRobot
-from sainet.scenes.pushes import Push
+from sainet.scenes.pushes import Push, check_push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene, pusher_gaps
-from sainet.scenes.state import State, at_rest, in_a_row
+from sainet.scenes.state import State, at_rest, in_a_row, poses_of
 from sainet.worlds.config import WorldConfig, bounds
 from sainet.worlds.noise import NoiseConfig, at_level
 from sainet.worlds.setups import RobotSetup
@@ -56,6 +56,7 @@ class SimulatedRobot(AbstractRobot):
     def arrange(self, state: State) -> None:
         """Put the disks and the pusher at these poses (m, rad), at rest."""
         self._truth = at_rest(state.position, state.angle, state.pusher_position)
+        self._measured = self._truth
 
     def resume(self, left: State | None, *seed: int) -> None:
         """Put the disks back where a push left them, and draw noise anew."""
@@ -65,7 +66,7 @@ class SimulatedRobot(AbstractRobot):
 
     def observe(self) -> State:
         """Return the measured poses; velocities are zero."""
-        pose = jnp.asarray(self._world.capture(_pose(self._truth)[None, None])[0, 0])
+        pose = jnp.asarray(self._world.capture(poses_of(self._truth)[None, None])[0, 0])
         self._measured = eqx.tree_at(
             lambda s: (s.position, s.angle), self._truth, (pose[:, :2], pose[:, 2])
         )
@@ -77,6 +78,7 @@ class SimulatedRobot(AbstractRobot):
         Args:
             push: one push (rad, rad, m, m/s), without a batch axis.
         """
+        check_push(push)
         # In the engine's batches: one scene, one push.
         scene, measured, truth, one = jax.tree.map(
             lambda x: jnp.asarray(x)[None],
@@ -89,7 +91,7 @@ class SimulatedRobot(AbstractRobot):
         end = jax.tree.map(lambda x: x[0, -1], states)
         self._truth = at_rest(end.position, end.angle, end.pusher_position)
         before, after = jax.tree.map(lambda x: np.asarray(x)[0], (initial, states))
-        pose = np.concatenate([_pose(before)[None], _pose(after)])
+        pose = np.concatenate([poses_of(before)[None], poses_of(after)])
         path = [before.pusher_position[None], after.pusher_position]
         # A generator of their own: measured poses leave all other noise unchanged.
         (rng,) = self._world.rng.spawn(1)
@@ -154,10 +156,6 @@ def scene_of(
 
 STILL = 1e-4  # m, of disk 1: a push that moves it less is useless
 DEEPEST = 1e-3  # m, more than the noise of motion capture
-
-
-def _pose(state: State) -> Float[np.ndarray, "*batch body 3"]:
-    return np.concatenate([state.position, state.angle[..., None]], axis=-1)
 
 
 def _start_trouble(scene: Scene, initial: State) -> str:

@@ -10,15 +10,21 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
+from sainet.scenes import quantities
 from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.geometry import direction, unit
-from sainet.scenes.quantities import SPEED, STROKE, require_count
+from sainet.scenes.quantities import require_count
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, at_rest, floats
+from sainet.scenes.state import State, at_rest, floats, is_traced
 
 _TO_REST = 32 / 240  # s, after a push, at least
 _BRAKING = 1.0  # m/s^2, of a disk that slides on a smooth table
-_PARAMETERS = ("contact_angle", "direction", "length", "speed")
+_PARAMETERS = {
+    "contact_angle": quantities.CONTACT_ANGLE,
+    "direction": quantities.DIRECTION,
+    "length": quantities.STROKE,
+    "speed": quantities.SPEED,
+}
 
 
 class Push(eqx.Module):
@@ -123,10 +129,16 @@ def push_direction(state: State, push: Push) -> Float[Array, "*batch 2"]:
     return unit(push_axis(state) + push.contact_angle + push.direction)
 
 
+def check_push(push: Push) -> None:
+    """Raise `BadScene` for a parameter that is out of range; traced ones are not."""
+    for name, quantity in _PARAMETERS.items():
+        if not is_traced(value := getattr(push, name)):
+            quantity.check(value, f"push: {name}", error=BadScene)
+
+
 def settled_steps(push: Push, time_step: float) -> int:
     """Return the steps until pushes have ended and everything rests; not traced."""
-    STROKE.check(push.length, "push: length", error=BadScene)
-    SPEED.check(push.speed, "push: speed", error=BadScene)
+    check_push(push)
     length, speed = np.asarray(push.length), np.asarray(push.speed)
     step = float(time_step)
     moving = float(np.max(length / speed, initial=0.0))

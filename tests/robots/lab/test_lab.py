@@ -22,6 +22,7 @@ from sainet.robots.lab.hidden import (
 )
 from sainet.robots.lab.mechanics import TICK, Mechanics
 from sainet.robots.lab.robot import LabRobot
+from sainet.runs.errors import BadScene
 from sainet.scenes.pushes import Push, command_path
 from sainet.scenes.state import State, at_rest, in_a_row
 
@@ -176,6 +177,37 @@ def test_people_put_touching_disks_together_and_never_into_each_other():
     )
     made.arrange(far)
     assert np.abs(made.truth.position - far.position).max() < 5e-3
+
+
+def test_disks_that_are_where_they_are_wanted_stay_while_another_one_is_dragged():
+    made = LabRobot(draw_lab(0, "abs"), TOUCHING)
+    before = poses(made.truth)
+    for step in range(50):
+        place = made.truth.position.at[1].set(jnp.array([0.2 + 0.001 * step, 0.05]))
+        made.arrange(at_rest(place, made.truth.angle, jnp.zeros(2, jnp.float32)))
+    after = poses(made.truth)
+    np.testing.assert_allclose(after[0], before[0], atol=1e-5)
+    np.testing.assert_allclose(after[1, :2], [0.249, 0.05], atol=3e-3)
+
+
+def test_a_push_begins_from_an_observation_of_its_own_if_there_is_none():
+    made = LabRobot(draw_lab(0, "abs"), TOUCHING)
+    place = TOUCHING.position
+    for offset in (0.0, 0.3):
+        moved = at_rest(place + offset, TOUCHING.angle, TOUCHING.pusher_position)
+        made.arrange(moved)
+        before = poses(made.truth)
+        assert made.push(push()).trouble == ""
+        assert np.linalg.norm((poses(made.truth) - before)[0, :2]) > 5e-3
+
+
+@pytest.mark.parametrize(("name", "value"), [("length", np.nan), ("speed", 0.0)])
+def test_a_push_out_of_range_is_refused_and_moves_nothing(name, value):
+    made = LabRobot(draw_lab(0, "abs"), TOUCHING)
+    before = poses(made.truth)
+    with pytest.raises(BadScene, match=f"push: {name} is {value:g}"):
+        made.push(push(**{name: value}))
+    np.testing.assert_array_equal(poses(made.truth), before)
 
 
 def test_a_push_that_begins_on_another_disk_is_refused():

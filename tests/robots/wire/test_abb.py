@@ -40,7 +40,7 @@ from sainet.robots.wire.limits import CYCLE
 from sainet.robots.wire.route import plan_route
 from sainet.robots.wire.transport import UdpTransport
 from sainet.robots.wire.vicon import ViconStream
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, BadScene
 from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid
 from sainet.scenes.recording import Recording
@@ -427,3 +427,14 @@ def test_the_robot_closes_its_connections():
     again = UdpTransport(controller="127.0.0.1", port=port)
     assert again.port == port
     again.close()
+
+
+@pytest.mark.parametrize("speed", [0.0, -0.05, np.nan])
+def test_a_push_out_of_range_is_refused_before_anything_moves(speed):
+    bad = eqx.tree_at(lambda push: push.speed, PUSH, jnp.float32(speed))
+    with loop() as made:
+        made.robot.observe()
+        before = made.controller.place.copy()
+        with pytest.raises(BadScene, match=f"push: speed is {speed:g}"):
+            made.robot.push(bad)
+        np.testing.assert_array_equal(made.controller.place, before)

@@ -11,10 +11,10 @@ from sainet.robots import RobotConfig
 from sainet.robots.base import AbstractRobot
 from sainet.robots.lab.hidden import Lab, draw_lab
 from sainet.robots.lab.mechanics import TICK, Mechanics, Motion
-from sainet.scenes.pushes import Push, place_pusher, push_direction
+from sainet.scenes.pushes import Push, check_push, place_pusher, push_direction
 from sainet.scenes.recording import Conditions, Recording
 from sainet.scenes.scene import PUSHER_RADIUS, Scene, pusher_gaps
-from sainet.scenes.state import State, at_rest, in_a_row
+from sainet.scenes.state import State, at_rest, in_a_row, poses_of
 
 CLEARANCE = 0.003  # m, between the pusher and disk 1 when it has descended
 _APPROACH = 0.03  # m/s
@@ -23,6 +23,7 @@ _HOLD = 0.5  # s, after the push, so that the disks come to rest
 _FRAMES = 10  # of motion capture, whose mean is an observation
 _TILT = np.deg2rad(5)
 _PLACED = (5e-4, np.deg2rad(1))  # m, rad: standard deviation of a person's hand
+_THERE = 1e-6  # m, rad: rounding of a pose where a disk is already
 _TOUCHING = 1e-3  # m: disks that are meant to touch are closer than this
 _LOOSE = 2e-4  # m: largest gap of disks that a person pushed together
 _GENERATOR = 0x1ABF0
@@ -52,6 +53,7 @@ class LabRobot(AbstractRobot):
         self._mechanics = Mechanics(lab)
         self._rng = _generator(lab, *np.atleast_1d(seed).tolist())
         self._pose = np.zeros((len(lab.disks), 3))  # in the robot's frame
+        self._measured: State | None = None  # since the disks were put there
         self.arrange(state)
 
     @property
@@ -70,10 +72,15 @@ class LabRobot(AbstractRobot):
         return _state(self._lab.capture.seen(self._pose))
 
     def arrange(self, state: State) -> None:
-        """Have a person put the disks there, who pushes those together that touch."""
+        """Have a person put the disks there, who pushes those together that touch.
+
+        Disks that are there already stay as they are.
+        """
         rng, (place, angle) = self._rng, _PLACED
-        wanted = np.concatenate([state.position, state.angle[..., None]], -1)
-        pose = wanted + rng.standard_normal(wanted.shape) * [place, place, angle]
+        wanted = poses_of(state)
+        stay = np.all(np.abs(wanted - poses_of(self.truth)) <= _THERE, axis=-1)
+        off = rng.standard_normal(wanted.shape) * [place, place, angle]
+        pose = wanted + np.where(stay[:, None], 0, off)
         radii = [disk.radius for disk in self._lab.disks]
         for i in range(1, len(pose)):
             for j in range(i):
@@ -81,31 +88,35 @@ class LabRobot(AbstractRobot):
                 apart = np.linalg.norm(wanted[i, :2] - wanted[j, :2])
                 between = pose[i, :2] - pose[j, :2]
                 distance = float(np.linalg.norm(between))
-                if abs(apart - reach) < _TOUCHING or distance < reach:
+                touch = abs(apart - reach) < _TOUCHING or distance < reach
+                if touch and not (stay[i] and stay[j]):
                     exact = reach + rng.uniform(0, _LOOSE)
                     pose[i, :2] = pose[j, :2] + between * exact / distance
-        self._pose = self._lab.capture.unseen(pose)
+        self._pose, self._measured = self._lab.capture.unseen(pose), None
 
     def resume(self, left: State | None, *seed: int) -> None:
         """Put the disks back where a push left them, and draw noise anew."""
         self._rng = _generator(self._lab, *seed)
         if left is not None:
-            pose = np.concatenate([left.position, left.angle[..., None]], -1)
-            self._pose = self._lab.capture.unseen(pose.astype(np.float64))
+            pose = poses_of(left).astype(np.float64)
+            self._pose, self._measured = self._lab.capture.unseen(pose), None
 
     def observe(self) -> State:
         """Return the measured poses: the mean of a few frames."""
         frames = np.repeat(self._pose[None], _FRAMES, 0)
-        self._measured = _state(self._lab.capture.measured(self._rng, frames).mean(0))
-        return self._measured
+        found = _state(self._lab.capture.measured(self._rng, frames).mean(0))
+        self._measured = found
+        return found
 
     def push(self, push: Push) -> Recording:
         """Approach disk 1 along its normal, wait, push and hold.
 
         The recording begins after the approach.
         """
-        start, normal, heading = self._plan(push)
-        if trouble := self._blocked(start - CLEARANCE * normal):
+        check_push(push)
+        state = self._measured or self.observe()
+        start, normal, heading = self._plan(state, push)
+        if trouble := self._blocked(state, start - CLEARANCE * normal):
             still = self._lab.capture.measured(self._rng, self._pose[None])
             return self._kept(push, np.zeros(1), still, start[None], trouble)
         before = start + np.multiply.outer(approach() - CLEARANCE, normal)
@@ -116,19 +127,16 @@ class LabRobot(AbstractRobot):
         self._pose = motion.pose[0, -1]
         return self._recording(push, motion, len(before))
 
-    def _plan(self, push: Push) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _plan(self, state: State, push: Push) -> tuple[np.ndarray, ...]:
         """Return the pusher's start, the contact normal and the push direction."""
-        scene, state, push = jax.tree.map(
-            jnp.asarray, (self.scene, self._measured, push)
-        )
+        scene, state, push = jax.tree.map(jnp.asarray, (self.scene, state, push))
         start = np.asarray(place_pusher(scene, state, push), np.float64)
         normal = np.asarray(state.position[0], np.float64) - start
         heading = np.asarray(push_direction(state, push), np.float64)
         return start, normal / np.linalg.norm(normal), heading
 
-    def _blocked(self, place: Float[np.ndarray, " 2"]) -> str:
+    def _blocked(self, state: State, place: Float[np.ndarray, " 2"]) -> str:
         """Return which disk the pusher would descend on; empty: none."""
-        state = self._measured
         state = at_rest(state.position, state.angle, jnp.asarray(place, jnp.float32))
         gaps = np.asarray(pusher_gaps(self.scene, state))
         if gaps.min() > 0:

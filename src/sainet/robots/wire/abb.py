@@ -24,7 +24,7 @@ from sainet.robots.wire.limits import Stopped
 from sainet.robots.wire.route import Path, Route, plan_route
 from sainet.robots.wire.tracker import AbstractTracker
 from sainet.runs.errors import BadInput, SainetError, unknown_name
-from sainet.scenes.pushes import Push
+from sainet.scenes.pushes import Push, check_push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, at_rest
@@ -154,6 +154,7 @@ class AbbRobot(AbstractRobot):
             A recording with the samples of arm and tracker, each at its own times. If
             the push was refused or stopped before it, one sample: the last observation.
         """
+        check_push(push)
         state, self._observed = self.truth, None
         try:
             route = self._route(state, push)
