@@ -11,6 +11,7 @@ from support import SOURCE
 
 PROGRAM = """
 import sys
+import gymnasium
 import sainet as sn
 
 pushes = sn.open_pushes(sys.argv[1])
@@ -28,6 +29,7 @@ for call in (
     lambda: sn.evaluate([3], pushes),
     lambda: sn.Push("left"),
     lambda: sn.PushToGoal({}),
+    lambda: gymnasium.make_vec("sainet/PushDisks-v0", 2).reset(seed=1.5),
 ):
     try:
         call()
@@ -51,6 +53,7 @@ LINES = [
     "BadInput model is 3; give a name, a folder or a model.",
     "BadScene push: contact_angle is left; give numbers.",
     "BadScene task: goal is {}; give numbers.",
+    "BadSetting `seed` is 1.5; it must be a whole number from 0 to 4294967295.",
 ]
 
 

@@ -413,6 +413,14 @@ def test_many_environments_take_the_whole_numbers_of_numpy_as_seeds(many):
     )
 
 
+def test_one_environment_takes_the_whole_numbers_of_numpy_as_seeds():
+    env = make()
+    wanted = env.reset(seed=3)[0]["desired_goal"]
+    np.testing.assert_array_equal(
+        env.reset(seed=np.int64(3))[0]["desired_goal"], wanted
+    )
+
+
 def test_many_environments_declare_their_autoreset(many):
     mode = gymnasium.vector.AutoresetMode.NEXT_STEP
     assert many.metadata["autoreset_mode"] == mode

@@ -21,10 +21,10 @@ from sainet.control.gym.spaces import (
     observation_space,
 )
 from sainet.control.gym.task import Observation, PushDisksTask
-from sainet.control.record import poses_of
 from sainet.control.trial import make_trial
 from sainet.runs.errors import require_one_of
 from sainet.scenes.quantities import require_count, require_seed
+from sainet.scenes.state import poses_of
 
 _RENDER_MODES = ("rgb_array",)
 
@@ -70,7 +70,10 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
         self._running: RunningTrial | None = None
 
     def reset(
-        self, *, seed: int | None = None, options: Mapping[str, object] | None = None
+        self,
+        *,
+        seed: int | np.integer | None = None,
+        options: Mapping[str, object] | None = None,
     ) -> tuple[Observation, dict[str, object]]:
         """Begin the first trial of a seed, or without a seed the next trial.
 
@@ -90,6 +93,7 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
         index = None if wanted is None else _trial(wanted)
         if seed is not None:
             require_seed(seed)
+            seed = int(seed)
         super().reset(seed=seed)
         if seed is not None:
             self._seed, self._next = seed, 0

@@ -186,7 +186,8 @@ def _seeds(seed: int | np.integer | Sequence[int], count: int) -> np.ndarray:
     Raises:
         BadInput: their number is another one, or a seed is no whole number from 0.
     """
-    if isinstance(seed, int | np.integer):
+    if not isinstance(seed, Sequence | np.ndarray):
+        require_seed(seed)
         seed = range(int(seed), int(seed) + count)
     each = list(seed)
     if len(each) != count:
