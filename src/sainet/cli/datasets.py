@@ -50,10 +50,7 @@ class Generate:
         total = None if shard else self.config.pushes
         bar = progress_bar("Simulating", total, self.output)
         with self.machines.executor(self.workers) as pool, bar as advance:
-
-            def report(pushes: int) -> None:
-                advance(pushes, "")
-
+            report = lambda pushes: advance(pushes, "")  # noqa: E731
             if shard is not None:
                 pushes = generate_share(
                     self.config, self.out, shard, executor=pool, on_pushes=report

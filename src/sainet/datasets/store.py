@@ -98,9 +98,8 @@ class Store:
 
     def first_alike(self) -> Int[np.ndarray, " push"]:
         """Return the first push that starts and is commanded as each push."""
-        _, first, place = np.unique(
-            self.push_hashes(), return_index=True, return_inverse=True
-        )
+        hashes = self.push_hashes()
+        _, first, place = np.unique(hashes, return_index=True, return_inverse=True)
         return first[place]
 
     @cached_property
@@ -108,9 +107,8 @@ class Store:
         import zarr
 
         # Consolidated metadata would be a second, unchecked description.
-        return zarr.open_group(
-            self.path / schema.ARRAYS, mode="r", use_consolidated=False
-        )
+        folder = self.path / schema.ARRAYS
+        return zarr.open_group(folder, mode="r", use_consolidated=False)
 
     def read(
         self, pushes: slice, names: tuple[str, ...] | None = None

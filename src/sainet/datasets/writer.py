@@ -46,9 +46,8 @@ def write_once(
         RunConflict: the folder belongs to another run, or another process uses it.
         BadInput: the disk is full.
     """
-    folder = open_run(
-        out, settings, finished_by=schema.HASHES
-    )  # locked as long as it exists
+    # Locked as long as it exists.
+    folder = open_run(out, settings, finished_by=schema.HASHES)
     if folder.is_finished:
         _log.info("%s is finished already", out)
         _clear_progress(out)

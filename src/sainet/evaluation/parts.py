@@ -46,8 +46,7 @@ class Parts:
         """
         weights = [[model.name, model.digest] for model in models]
         known: dict[str, object] = {"command": "evaluate", "models": weights}
-        known |= {"data": store.content}
-        known.update(settings)
+        known |= {"data": store.content, **settings}
         return cls(out, known, open_run(out, known, finished_by="", shared=shared))
 
     def file(self, model: str) -> Path:

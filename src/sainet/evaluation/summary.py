@@ -109,7 +109,6 @@ def summarise(measured: measurements.Measurements, *, subject: str = "") -> Summ
         return _of_trials(measured, found)
     rows: list[Row] = []
     predictions: list[Row] = []
-    factors: list[Factor] = []
     parts = [_Part(measured, condition) for condition in header.conditions]
     for part in parts:
         for slug in part.slugs:
@@ -117,7 +116,6 @@ def summarise(measured: measurements.Measurements, *, subject: str = "") -> Summ
             (predictions if is_prediction else rows).extend(
                 part.rows(slug, with_intervals=not is_prediction)
             )
-        factors += part.factors()
     pairs = _pairs(measured, subject)
     order = [(p, part) for p in pairs for part in parts]
     if subject:  # condition by condition
@@ -133,7 +131,7 @@ def summarise(measured: measurements.Measurements, *, subject: str = "") -> Summ
         rows=tuple(rows),
         predictions=tuple(predictions),
         comparisons=tuple(compared),
-        factors=tuple(factors),
+        factors=tuple(each for part in parts for each in part.factors()),
     )
 
 
@@ -211,13 +209,14 @@ class _Part:
         """Yield the row of each body."""
         errors = self.models[slug]
         found = {key: metric.of(errors) for key, metric in METRICS.items()}
+        shape = errors.errors["pos_mm"].shape
         for body in range(self.bodies):
             yield Row(
                 condition=self.condition.label,
                 model=slug,
                 body=body + 1,
                 count=len(self.travel_mm),
-                trainings=_trainings(errors),
+                trainings=shape[0] if len(shape) > 2 else 1,  # noqa: PLR2004
                 values={
                     key: estimate(each, body, with_interval=with_intervals)
                     for key, each in found.items()
@@ -278,8 +277,3 @@ class _Part:
             or not np.isfinite(each.errors["pos_mm"]).any()
             for each in self.models.values()
         )
-
-
-def _trainings(errors: ModelErrors) -> int:
-    values = next(iter(errors.errors.values()))
-    return len(values) if values.ndim > 2 else 1  # noqa: PLR2004

@@ -53,9 +53,7 @@ def arrange(summary: Summary) -> Table:
     every, notes = _without_twins(_by_line(summary, summary.rows), summary)
     theirs = [*_by_line(summary, summary.predictions), *_published(summary)]
     metrics = _used(every, theirs)
-    bodies = tuple(
-        sorted({body for values in every + theirs for body in values.bodies})
-    )
+    bodies = tuple(sorted({body for each in every + theirs for body in each.bodies}))
     columns = tuple(Column(m.key, m.name, m.unit, bodies) for m in metrics)
     labels = labels_of(values.model for values in every + theirs)
     lines = [_line(values, metrics, bodies, labels) for values in every]

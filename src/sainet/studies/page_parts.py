@@ -218,8 +218,7 @@ def draw_figures(evidence: Evidence, figures: Path) -> None:
     draw_success(parts(_SUCCESS_OF), figures / "goals-solved.svg")
     for name in STUDIES:
         study = load_study(name)
-        summary = evidence.find(name)
-        if summary is None:
+        if (summary := evidence.find(name)) is None:
             continue
         if study.figure is not None:
             study.figure(summary, figures / f"{name}.svg")

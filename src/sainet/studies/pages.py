@@ -155,9 +155,8 @@ def verdict(name: str, text: str, summary: Summary) -> str:
     """
     ruled = rule_on(load_study(name).claims, summary)
     (found,) = (each for each in ruled if each.claim.text == text)
-    return f"**{found.status}**" + (
-        f" (p\N{NO-BREAK SPACE}{found.p:.2g})" if found.p else ""
-    )
+    p = f" (p\N{NO-BREAK SPACE}{found.p:.2g})" if found.p else ""
+    return f"**{found.status}**{p}"
 
 
 def paper_verdict(text: str, evidence: Evidence) -> str:

@@ -182,7 +182,8 @@ class Runner:
         """Wait until nothing needed is running, or all processes are needed for one."""
         apart = [s for s in needed if s.place is Place.APART]
         left = [s for s in apart if s.key not in self._results]
-        with self.bar(_title(left), len(left)) as bar:
+        more = f" and {len(left) - 1} more" if left[1:] else ""
+        with self.bar(left[0].name + more, len(left)) as bar:
             while bar.done < len(left) and not self._spread_ready(needed):
                 done, _ = wait(self._running, _LOOK_AGAIN, FIRST_COMPLETED)
                 for future in done:
@@ -192,8 +193,7 @@ class Runner:
                     if step.key in self._errors:  # those of steps ahead may wait
                         raise self._errors[step.key]
                 ended = sum(step.key in self._results for step in left)
-                running = map(self._progress, self._running.values())
-                bar.reach(ended, ", ".join(running))
+                bar.reach(ended, ", ".join(map(self._progress, self._running.values())))
 
     def _take(self, future: Future[Any]) -> None:
         """Take the result of a step from the executor, or from its run folder."""
@@ -217,10 +217,6 @@ class Runner:
             future.cancel()
             self.clock.end(step, is_done=False)
         self._running.clear()
-
-
-def _title(steps: Sequence[Step[Any]]) -> str:
-    return f"{steps[0].name} and {len(steps) - 1} more" if steps[1:] else steps[0].name
 
 
 def run_alone(step: Step[T], out: Path) -> T | None:

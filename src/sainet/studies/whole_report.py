@@ -19,7 +19,6 @@ from sainet.studies.run_report import figures_of
 from sainet.studies.steps import Step
 from sainet.studies.study import TABLE, Result
 
-_NOT_ASKED_FOR = "not asked for"
 _OF_QUICK = (
     "The quick scale shows that every study runs. Its networks have hardly been "
     "trained: neither its numbers nor its rulings can be compared with the paper's."
@@ -58,7 +57,7 @@ def whole_report(
         for name in STUDIES
         if (path := folder_of(out, name, scale) / TABLE).is_file()
     }
-    missing = {name: _NOT_ASKED_FOR for name in STUDIES if name not in found}
+    missing = {name: "not asked for" for name in STUDIES if name not in found}
     missing |= {name: why for name, why in not_run.items() if name in missing}
     concluded = conclude(lambda study: found[study].summary if study in found else None)
     return Report(
@@ -117,5 +116,4 @@ def _durations(steps: Iterable[Step[Any]], clock: Clock) -> PlainTable:
 
 def _rows(taken: Mapping[str, list[float]]) -> Iterator[tuple[str, ...]]:
     for kind, seconds in sorted(taken.items(), key=lambda pair: -sum(pair[1])):
-        numbers = f"{sum(seconds):.0f} s", f"{max(seconds):.0f} s"
-        yield (kind, str(len(seconds)), *numbers)
+        yield kind, str(len(seconds)), f"{sum(seconds):.0f} s", f"{max(seconds):.0f} s"

@@ -9,7 +9,9 @@ import matplotlib
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import Locator, NullFormatter
 from matplotlib.transforms import Affine2D, ScaledTranslation
 
 from sainet.report.palette import INK, PAPER, ModelStyle
@@ -103,6 +105,13 @@ def add_grid(axes: Axes, axis: str = "y") -> None:
     """Draw faint lines behind the data, along one axis or both."""
     axes.grid(axis=axis, color=INK, alpha=0.12, linewidth=0.6)  # type: ignore[arg-type]
     axes.set_axisbelow(True)
+
+
+def number_ticks(axis: Axis, locator: Locator) -> None:
+    """Write plain numbers at the major ticks of a logarithmic axis, and no others."""
+    axis.set_major_locator(locator)
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def label_ends(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, NullLocator
 
 from sainet.evaluation.summary import Summary
 from sainet.report.figures import canvas
@@ -73,10 +73,7 @@ def _set_axes(axes: Axes, lines: Mapping[str, Line]) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     counts = sorted({disks for line in lines.values() for disks, _ in line})
-    axes.xaxis.set_major_locator(FixedLocator(counts))
-    axes.yaxis.set_major_locator(FixedLocator(_TICKS))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter(NullFormatter())
+    canvas.number_ticks(axes.xaxis, FixedLocator(counts))
+    canvas.number_ticks(axes.yaxis, FixedLocator(_TICKS))
     axes.xaxis.set_minor_locator(NullLocator())
     canvas.add_grid(axes)

@@ -14,7 +14,6 @@ from matplotlib.ticker import (
     FuncFormatter,
     LogLocator,
     MaxNLocator,
-    NullFormatter,
     NullLocator,
 )
 from scipy.ndimage import uniform_filter1d
@@ -46,9 +45,7 @@ def draw_learning_curve(histories: Mapping[str, History], path: Path) -> Path:
         figure = canvas.new_figure(6.4, 3.4)
         axes = figure.subplots()
         axes.set_yscale("log")
-        axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        axes.yaxis.set_major_formatter("{x:g}")
-        axes.yaxis.set_minor_formatter(NullFormatter())
+        canvas.number_ticks(axes.yaxis, LogLocator(subs=(1, 2, 5)))
         for name, history in histories.items():
             _draw_history(axes, styles[name], history)
         axes.set(xlabel="iteration", ylabel="loss", title="Learning")
@@ -146,11 +143,7 @@ def draw_data_efficiency(summary: Summary, path: Path) -> Path:
         for condition in summary.conditions
         if condition.factors.keys() == {FACTOR}
     }
-    rows = [
-        _Row(sizes[row.condition], row)
-        for row in summary.rows
-        if row.condition in sizes
-    ]
+    rows = [_Row(sizes[r.condition], r) for r in summary.rows if r.condition in sizes]
     # Where only the ends of pushes were observed, no mean over a push is another.
     means = ((row.values, m) for _, row in rows for m in METRICS)
     ends = all(v.get(m) in (None, v.get(f"final_{m}")) for v, m in means)
@@ -222,6 +215,4 @@ def _set_scale(axes: Axes) -> None:
     if axes.dataLim.y1 < _WIDE * axes.dataLim.y0:
         return
     axes.set_yscale("log")
-    axes.yaxis.set_major_locator(FixedLocator(_TICKS))
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    canvas.number_ticks(axes.yaxis, FixedLocator(_TICKS))

@@ -9,12 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import (
-    FixedLocator,
-    FuncFormatter,
-    NullFormatter,
-    PercentFormatter,
-)
+from matplotlib.ticker import FixedLocator, PercentFormatter
 
 from sainet.evaluation.claims import our_model
 from sainet.evaluation.summary import BASELINE, Summary
@@ -152,9 +147,7 @@ def draw_panels(panels: Sequence[Panel], path: Path) -> Path:
 def _set_ratios(axes: Axes) -> None:
     """Make an axis one of ratios: logarithmic, with a line at one."""
     axes.set_xscale("log")
-    axes.xaxis.set_major_locator(FixedLocator(_SHARES))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    canvas.number_ticks(axes.xaxis, FixedLocator(_SHARES))
     axes.axvline(1, color=INK, linewidth=0.8)
     # An interval may reach far below every number.
     axes.set_xlim(left=max(axes.get_xlim()[0], _SHARES[0] / 2))
