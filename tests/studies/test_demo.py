@@ -14,9 +14,11 @@ from report.test_report_browser import element, milliseconds, opened
 from sainet.cli.demo import Demo
 from sainet.cli.output import Output
 from sainet.cli.reproduce import Reproduce
+from sainet.datasets.config import GenerateConfig
+from sainet.datasets.generate import generate
 from sainet.evaluation.claims import Claim, Verdict
 from sainet.evaluation.summary import Summary
-from sainet.runs.errors import BadInput, MissingExtra, UnknownName
+from sainet.runs.errors import BadInput, BadStore, MissingExtra, UnknownName
 from sainet.studies import STUDIES, DemoConfig, load_study
 from sainet.studies.demo import typical_push
 from sainet.studies.paper_tables import PUBLISHED_ROBOT_TWO_DISKS
@@ -107,7 +109,7 @@ def begun(monkeypatch):
     folders = []
 
     def run(self, name, scope, runner, out, *, command):
-        assert command == ("sainet", "reproduce", name, "--scale", scope.scale)
+        assert command[:5] == ["sainet", "reproduce", name, "--scale", scope.scale]
         folders.append(out)
         return NOTHING
 
@@ -147,6 +149,28 @@ def test_skipped_studies_are_reported_even_when_quiet(begun, monkeypatch, capsys
     assert not_run["recorded-pushes"].startswith("--recorded is missing: give")
     assert "PyBullet" in not_run["engine-parity"]
     assert "sainet[mujoco]" in not_run["lab-control"]
+
+
+def test_the_origin_of_measurements_names_every_option_that_changes_them(
+    monkeypatch, tmp_path
+):
+    commands = []
+
+    def run(self, name, scope, runner, out, *, command):
+        commands.append(" ".join(command))
+        return NOTHING
+
+    monkeypatch.setattr(Study, "run", run)
+    monkeypatch.setattr("sainet.cli.reproduce.use_devices", lambda count: None)
+    Reproduce(studies=("robot-planar",), trainings=1, out=tmp_path).run()
+    assert commands == ["sainet reproduce robot-planar --scale quick --trainings 1"]
+
+
+def test_simulated_pushes_are_not_taken_for_recorded_ones(begun, tmp_path):
+    made = generate(GenerateConfig(pushes=2, chunk_size=2, disks=1), tmp_path / "made")
+    with pytest.raises(BadStore, match="simulated; `recorded` takes"):
+        Reproduce(studies=("recorded-pushes",), recorded=made.path).run()
+    assert begun == []
 
 
 def test_claims_are_printed_and_in_the_json(monkeypatch, capsys, tmp_path):

@@ -116,9 +116,8 @@ class Reproduce:
         from sainet.studies.shares import divided, kept_steps, unfinished
         from sainet.studies.study import STEPS
 
-        if shard is None:
-            steps = list(all_steps(lasts).values())
-        else:
+        steps = list(all_steps(lasts).values())
+        if shard is not None:
             steps = divided(kept_steps(lasts), shard)
         left = unfinished(steps, self.out / STEPS)
         expected = expected_seconds(left)
@@ -137,20 +136,20 @@ class Reproduce:
         from sainet.studies.whole_report import whole_report
 
         steps = all_steps(lasts).values()
+        command = shlex.join(self._command(*self.studies, out=self.out))
         report = whole_report(
-            self.out, self.scale, not_run, steps, runner.clock, command=self._command
+            self.out, self.scale, not_run, steps, runner.clock, command=command
         )
         path = write_report(report, self.out / REPORT)
         self.output.say(f"All studies in {self.out} on one page: {path}")
 
-    @property
-    def _command(self) -> str:
-        """The command that makes the report of all studies."""
-        words = ["sainet", "reproduce", *self.studies, "--scale", self.scale]
-        given = {"out": self.out, "recorded": self.recorded}
-        for name, value in {**given, "trainings": self.trainings}.items():
+    def _command(self, *studies: str, out: Path | None = None) -> list[str]:
+        """Return the command that makes the results of studies, word by word."""
+        words = ["sainet", "reproduce", *studies, "--scale", self.scale]
+        given = {"out": out, "recorded": self.recorded, "trainings": self.trainings}
+        for name, value in given.items():
             words += [] if value is None else [f"--{name}", str(value)]
-        return shlex.join(words)
+        return words
 
     @contextmanager
     def _runner(
@@ -197,9 +196,8 @@ class Reproduce:
         from sainet.report.writers import print_table
 
         self.output.say(f"{name}: {study.question}")
-        command = ("sainet", "reproduce", name, "--scale", self.scale)
         out = self.out / f"{name}-{self.scale}"
-        result = study.run(name, scope, runner, out, command=command)
+        result = study.run(name, scope, runner, out, command=self._command(name))
         console = self.output.console
         print_table(arrange(result.summary), console)
         for ruling in rulings(study.claims, result.summary):
@@ -215,9 +213,8 @@ class Reproduce:
         import jax
 
         is_cpu = jax.default_backend() == "cpu"
-        count = self.at_once
-        if count is None:
-            count = core_count() if is_cpu else 1
+        usual = core_count() if is_cpu else 1
+        count = usual if self.at_once is None else self.at_once
         if count < 1:
             raise BadInput(f"--at-once is {count}; it must be at least 1.")
         if count > 1 and not is_cpu:

@@ -19,7 +19,7 @@ from sainet.evaluation.summary import Summary, summarise
 from sainet.models.card import CARD, WEIGHTS, read_card
 from sainet.report.figures.engine_errors import draw_engine_errors
 from sainet.runs.documents import write_bytes, write_document, write_json
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, BadStore
 from sainet.runs.folders import CONFIG
 from sainet.runs.manifest import MANIFEST, manifest
 from sainet.studies import Scale
@@ -124,7 +124,7 @@ class Scope:
 
         Raises:
             MissingInput: none were given.
-            BadStore: they cannot be used.
+            BadStore: they cannot be used, or were simulated.
         """
         if self.recorded is None:
             raise MissingInput(
@@ -132,6 +132,8 @@ class Scope:
                 "mitpush-endpoints' made of recorded pushes."
             )
         store = open_store(self.recorded)
+        if not store.info.is_recorded:
+            raise BadStore(f"{store.path}: simulated; `recorded` takes imported ones.")
         return store if self.scale == "paper" else _some_of_each_group(store, quick)
 
 
@@ -243,20 +245,12 @@ class Study:
             cases = {k: runner.result(v) for k, v in plan.engine_errors.items()}
             draw_engine_errors(cases, out / ENGINE_ERRORS)
         for step in plan.networks:
-            _copy(runner.folder(step), out / "networks" / step.id.slug)
-        _write(name, result, scope, out)
+            folder, target = runner.folder(step), out / "networks" / step.id.slug
+            write_bytes(target / WEIGHTS, (folder / WEIGHTS).read_bytes())
+            write_document(target / CARD, read_card(folder))
+        content = scope.recorded and open_store(scope.recorded).content
+        made = {"command": "reproduce", "study": name, "recorded": content}
+        write_json(out / CONFIG, made)
+        write_document(out / MANIFEST, manifest())
+        write_document(out / TABLE, result)
         return result
-
-
-def _write(name: str, result: Result, scope: Scope, out: Path) -> None:
-    content = scope.recorded and open_store(scope.recorded).content
-    made = {"command": "reproduce", "study": name, "recorded": content}
-    write_json(out / CONFIG, made)
-    write_document(out / MANIFEST, manifest())
-    write_document(out / TABLE, result)
-
-
-def _copy(folder: Path, target: Path) -> None:
-    """Copy the card and the weights of a network."""
-    write_bytes(target / WEIGHTS, (folder / WEIGHTS).read_bytes())
-    write_document(target / CARD, read_card(folder))
