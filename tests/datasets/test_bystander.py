@@ -182,6 +182,14 @@ def test_unknown_paths_are_refused(tmp_path):
         assert not (tmp_path / f"{name}-out").exists()
 
 
+def test_a_disk_too_many_leaves_nothing_behind(tmp_path):
+    info = info_of(2, bodies=100, assumed_engines=())
+    data = write(tmp_path / "data", info, made_up(info))
+    with pytest.raises(BadStore, match=r"has 100 disks, the most; give one of fewer"):
+        add_bystander(data, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_the_command_reports_its_output_and_refuses_other_folders(
     store, tmp_path, capsys
 ):

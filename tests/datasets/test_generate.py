@@ -191,7 +191,9 @@ def test_more_disks_than_bullet_can_have_leave_nothing_behind(tmp_path, engines)
 
 def test_more_steps_than_a_push_can_have_leave_nothing_behind(tmp_path):
     config = GenerateConfig(stroke_mm=(1000.0,), speed_mm_s=(0.5,), pushes=1)
-    with pytest.raises(BadInput, match=r"`stroke_mm` is .* `speed_mm_s` higher: 480"):
+    with pytest.raises(
+        BadInput, match=r"`stroke_mm` is 1000.0; .* `hold_steps` fewer: 480"
+    ):
         generate(config, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -208,6 +210,7 @@ def test_a_truth_of_nan_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr("sainet.datasets.generate.make_engine", lambda _: LostEngine())
     with pytest.raises(Diverged, match="push 0 of the dataset: engine planar gave"):
         generate(small(pushes=7, noise_level="none"), tmp_path / "store")
+    assert not (tmp_path / "store").exists()
 
 
 def test_pushes_that_could_not_be_read_again_are_refused(tmp_path):
@@ -215,7 +218,7 @@ def test_pushes_that_could_not_be_read_again_are_refused(tmp_path):
     says = r"truth.*: push 0: .* it must be from .*; reduce `force_n` or `force_steps`"
     with pytest.raises(BadInput, match=says):
         generate(GenerateConfig(setup="direct-force", **hard), tmp_path / "store")
-    assert not (tmp_path / "store" / schema.HASHES).exists()
+    assert not (tmp_path / "store").exists()
 
 
 def test_a_missing_engine_leaves_nothing_behind(tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -147,3 +148,21 @@ def test_cores_are_counted_where_affinity_is_unknown(monkeypatch):
     assert 1 <= core_count() <= (os.cpu_count() or 1)
     monkeypatch.delattr(os, "sched_getaffinity")
     assert core_count() == os.cpu_count()
+
+
+def fail_at_once(folder: Path, index: int) -> int:
+    if index == 0:
+        wait_for(folder, "began", 1)
+        raise SainetError("impossible")
+    (folder / "began").touch()
+    time.sleep(0.5)
+    (folder / "ended").touch()
+    return index
+
+
+def test_an_error_is_raised_after_all_running_jobs_have_ended(tmp_path):
+    with ThreadPoolExecutor(2) as pool:
+        jobs = [(tmp_path, index) for index in range(2)]
+        with pytest.raises(SainetError, match="impossible"):
+            list(each_done(pool, fail_at_once, jobs))
+        assert (tmp_path / "ended").exists()

@@ -22,6 +22,7 @@ from sainet.datasets.store import Store
 from sainet.datasets.writer import derive
 from sainet.engines.simulator import stored_simulator
 from sainet.runs.errors import BadStore
+from sainet.scenes.quantities import MOST_DISKS
 
 TOUCHING = 0.5  # fraction of the attempts that touch another disk
 FARTHEST = 0.02  # m, largest gap to the nearest disk
@@ -48,12 +49,13 @@ def add_bystander(
         on_pushes: called with the number of newly predicted pushes.
 
     Raises:
-        BadStore: the path of a disk is unknown at some step.
+        BadStore: the path of a disk is unknown at some step, or no engine of the
+            dataset can have one disk more.
         RunConflict: the folder belongs to another run.
         MissingExtra: an internal engine needs a package that is not installed.
     """
     rng = np.random.default_rng([_STREAM, seed])
-    _check_paths(store)  # before the folder exists
+    _check_possible(store)  # before the folder exists
 
     def change(arrays: Arrays) -> Arrays:
         return with_bystander(arrays, store.info, rng, on_pushes)
@@ -61,7 +63,11 @@ def add_bystander(
     return derive(store, out, {"bystander_seed": seed}, change)
 
 
-def _check_paths(store: Store) -> None:
+def _check_possible(store: Store) -> None:
+    specs = map(stored_simulator, store.info.assumed_engines)
+    most = min([MOST_DISKS, *(spec.build().most_disks for spec in specs)])
+    if store.info.bodies >= most:
+        raise BadStore(f"{store.path}: has {most} disks, the most; give one of fewer.")
     arrays = store.read(slice(None), ("truth", "truth_pusher", "steps"))
     known = np.isfinite(arrays["truth"]).all((2, 3))
     known &= np.isfinite(arrays["truth_pusher"]).all(2)

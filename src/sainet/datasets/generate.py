@@ -1,5 +1,6 @@
 """Simulated datasets, made chunk by chunk by any number of workers."""
 
+import shutil
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import asdict
@@ -17,7 +18,7 @@ from sainet.datasets.writer import MakeChunk, write_once, write_share
 from sainet.engines import make_engine
 from sainet.engines.base import roll_out
 from sainet.engines.simulator import simulator_named
-from sainet.runs.errors import BadInput, require
+from sainet.runs.errors import BadScene, Diverged, require
 from sainet.runs.shards import Shard
 from sainet.scenes.controls import Controls
 from sainet.scenes.quantities import MOST_STEPS, PROPERTIES
@@ -44,6 +45,8 @@ def generate(
 ) -> Store:
     """Return a dataset of simulated pushes; an interrupted one resumes.
 
+    A folder that is made here is removed where the pushes turn out to be impossible.
+
     Equal settings give byte-identical datasets, whatever the interruptions and the
     number of workers.
 
@@ -55,13 +58,19 @@ def generate(
 
     Raises:
         RunConflict: the folder belongs to another run.
-        BadInput: the disk is full, a scene has no room for its disks, an engine cannot
-            have as many, or something moves too far or too fast.
+        BadInput: the disk is full, a scene has no room for its disks, or an engine
+            cannot have as many.
+        BadScene: something moves too far or too fast.
         MissingExtra: an engine needs a package that is not installed.
         Diverged: an engine produced NaN or infinity.
     """
-    parts = _parts(config)
-    return write_once(out, *parts, executor=executor, on_pushes=on_pushes)
+    is_new, parts = not out.exists(), _parts(config)
+    try:
+        return write_once(out, *parts, executor=executor, on_pushes=on_pushes)
+    except (BadScene, Diverged):  # as it would be with equal settings again
+        if is_new:
+            shutil.rmtree(out, ignore_errors=True)
+        raise
 
 
 def generate_share(
@@ -107,8 +116,9 @@ def _check_possible(config: GenerateConfig) -> None:
     wanted = f"at most {most} with these engines"
     require(config.disks <= most, "disks", wanted, config.disks)
     info = store_info(config)
-    wanted = f"shorter, or `speed_mm_s` higher: {info.steps} steps exceed {MOST_STEPS}"
-    require(info.steps <= MOST_STEPS, "stroke_mm", wanted, config.stroke_mm)
+    wanted = f"shorter, `speed_mm_s` higher or `hold_steps` fewer: {info.steps} steps "
+    wanted += f"exceed {MOST_STEPS}"
+    require(info.steps <= MOST_STEPS, "stroke_mm", wanted, max(config.stroke_mm))
     for index in range(info.chunks):
         draw(config, chunk_generator(config.seed, index), config.chunk_size)
 
@@ -141,7 +151,7 @@ def simulate_chunk(config: GenerateConfig, index: int) -> Arrays:
 
     Raises:
         Diverged: an engine predicted NaN or infinity.
-        BadInput: a value is out of the range of stored values.
+        BadScene: a value is out of the range of stored values.
     """
     info = store_info(config)
     part = info.chunk_slice(index)
@@ -175,12 +185,11 @@ def simulate_chunk(config: GenerateConfig, index: int) -> Arrays:
         "measured": world.capture(truth[..., :3]),
     }
     arrays = {name: value[: part.stop - part.start] for name, value in arrays.items()}
-    pushes = info.push_names(part)
     for array, engine in engines.items():
-        check_finite(engine, arrays[array], pushes)
+        check_finite(engine, arrays[array], info.push_names(part))
     rows = np.arange(part.start, part.stop)
     for name, reason in out_of_range(info, rows, arrays, arrays.__getitem__):
-        raise BadInput(f"{name}: {reason}; {_SLOWER[config.setup]}.")
+        raise BadScene(f"{name}: {reason}; {_SLOWER[config.setup]}.")
     return arrays
 
 

@@ -194,6 +194,9 @@ def each_done(
             yield future.result()
     except BrokenProcessPool:
         raise worker_lost() from None
+    except SainetError:
+        list(as_completed([each for each in futures if not each.cancel()]))
+        raise
     finally:
         for future in futures:
             future.cancel()
