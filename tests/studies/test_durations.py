@@ -8,7 +8,7 @@ from sainet.control.config import ControlConfig
 from sainet.datasets.config import GenerateConfig
 from sainet.evaluation.measurements import Condition
 from sainet.runs.errors import BadInput
-from sainet.studies import STUDIES, durations, effort, load_study
+from sainet.studies import STUDIES, any_number, durations, effort, load_study
 from sainet.studies.durations import DURATIONS, Clock, Duration, in_words
 from sainet.studies.effort import Effort, Rate, Rates, expected_seconds, measured_rates
 from sainet.studies.lab_pushes import Collect
@@ -182,6 +182,20 @@ def test_expected_seconds_grow_with_the_work_and_shrink_with_cores(monkeypatch):
         found = list(expected_seconds(steps).values())
         # A push is simulated once for the truth and once for each assumed engine.
         assert found == [(1 + 0.5 * size) * times for size in (10 * 2 * 2, 30 * 2 * 3)]
+
+
+def test_contact_networks_have_rates_of_their_own_and_mixtures_all_their_disks():
+    scope = Scope("paper")
+    (held,), (often,) = (
+        {effort.effort(each) for each in any_number.of_two(scope, *settings)}
+        for settings in ((), (any_number.ASSUMED, any_number.FOR_ASSUMED))
+    )
+    assert (held.kind, often.kind) == (
+        "Train whole-push, held",
+        "Train whole-push, contact",
+    )
+    (mixed,) = {effort.effort(each) for each in any_number.of_one_to_four(scope)}
+    assert mixed == Effort(held.kind, held.size * 2.5 / 2)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, singledispatch
 from importlib.resources import files
+from statistics import fmean
 from typing import Any, NamedTuple
 
 import msgspec
@@ -114,12 +115,14 @@ def _(step: steps.Simulate) -> Effort:
 @effort.register
 def _(step: steps.Train) -> Effort:
     way, optimiser = step.recipe.horizon, step.recipe.optimiser
-    extent = _extent(step.pushes)
-    batch, length = min(optimiser.batch_size, extent.pushes), extent.steps
-    computed = batch * min(way.steps, length) / way.hold * extent.disks
-    size = optimiser.iterations * computed
-    more = ", held" * (way.hold > 1) + ", one disk" * (extent.disks == 1)
-    return Effort(f"Train {way.kind}{more}", size)
+    pushes = _extent(step.pushes)
+    # A mixture takes its batches in turn from datasets of several numbers of disks.
+    every = step.pushes, *getattr(step, "more", ())
+    disks = fmean(_extent(each).disks for each in every)
+    size = optimiser.iterations * min(optimiser.batch_size, pushes.pushes)
+    size *= min(way.steps, pushes.steps) / way.hold * disks
+    more = ", held" if way.hold > 1 else ", contact" * (step.id.features == "contact")
+    return Effort(f"Train {way.kind}{more}" + ", one disk" * (disks == 1), size)
 
 
 @effort.register
