@@ -12,7 +12,13 @@ from sainet.datasets.groups import groups_of
 from sainet.datasets.store import open_store
 from sainet.datasets.writer import write_store
 from sainet.engines import RECORDED
-from sainet.evaluation.coverage import MEASURED, Coverage, coverage_of, in_words
+from sainet.evaluation.coverage import (
+    MEASURED,
+    Coverage,
+    coverage_of,
+    in_words,
+    rows_of,
+)
 from sainet.evaluation.intervals import Estimate
 from sainet.evaluation.measurements import Header, measurements_of
 from sainet.evaluation.unlike import (
@@ -132,3 +138,4 @@ def test_a_few_regions_that_all_hold_prove_little(held, folds, words):
         data = found.data.assign_coords(fold=("sample", np.array(folds, np.int32)))
         found = replace(found, data=data)
     assert words in in_words(coverage_of(found), {"gp": "GP"})[0]
+    assert rows_of(found, [""])[0][1] == "Gaussian process"  # as in other tables

@@ -124,7 +124,9 @@ HEADINGS = (
 def rows_of(measured: Measurements, conditions: Sequence[str]) -> list[list[str]]:
     """Return the coverage in some conditions, in their order, below `HEADINGS`."""
     found = coverage_of(measured)
-    return [_cells(e) for label in conditions for e in found if e.condition == label]
+    models = {model.slug: model.label for model in measured.header.models}
+    chosen = [e for label in conditions for e in found if e.condition == label]
+    return [_cells(each, models[each.model]) for each in chosen]
 
 
 def to_json(found: Sequence[Coverage]) -> dict[str, object]:
@@ -135,7 +137,7 @@ def to_json(found: Sequence[Coverage]) -> dict[str, object]:
 _UNKNOWN = "–"  # noqa: RUF001
 
 
-def _cells(found: Coverage) -> list[str]:
+def _cells(found: Coverage, label: str) -> list[str]:
     unit = "°" if found.kind == "rot" else " mm"
     ends = [found.inside, found.size, found.score, found.over_plain]
     digits = [1, 2, 2, 2]
@@ -148,8 +150,7 @@ def _cells(found: Coverage) -> list[str]:
     ]
     numbers[1], numbers[2] = numbers[1] + unit, numbers[2] + unit
     what = "position" if found.kind == "pos" else "rotation"
-    words = [found.condition, f"`{found.model}`", what]
-    return [*words, str(found.body), str(found.count), *numbers]
+    return [found.condition, label, what, str(found.body), str(found.count), *numbers]
 
 
 def in_words(found: Sequence[Coverage], labels: Mapping[str, str]) -> list[str]:
