@@ -123,6 +123,8 @@ def test_a_missing_number_is_a_dash():
     assert parse(result).rows[2][4] == "–"
     assert "| – / 3.24" in markdown(result)
     assert "nan" not in printed(result)
+    (heading, *rows) = csv.reader(io.StringIO(to_csv(arrange(result))))
+    assert rows[0][heading.index("pos (mm) disk 1")] == ""  # a number for programs
 
 
 def test_metrics_without_numbers_are_left_out():

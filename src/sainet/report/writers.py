@@ -5,6 +5,7 @@ import html
 import io
 import re
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 from rich import box
@@ -244,7 +245,7 @@ def _tex(text: str) -> str:
 
 
 def to_csv(table: Table) -> str:
-    """Return the table as CSV: values and intervals in columns of their own."""
+    """Return the table as CSV: values and intervals in columns, empty if unknown."""
     columns = [(c, body) for c in table.columns for body in c.bodies or (0,)]
     headings = [
         f"{_heading(*each)}{part}" for each in columns for part in ("", " interval")
@@ -253,8 +254,8 @@ def to_csv(table: Table) -> str:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow([*_leading(table), *headings])
     for line in (*table.lines, *table.published):
-        cells = [text for cell in line.cells for text in (cell.text, cell.interval)]
-        writer.writerow([*_names(table, line), *cells])
+        pairs = ((cell.text.strip(DASH), cell.interval) for cell in line.cells)
+        writer.writerow([*_names(table, line), *chain(*pairs)])
     return stream.getvalue()
 
 
