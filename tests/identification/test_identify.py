@@ -48,19 +48,17 @@ STROKES = GenerateConfig(
 )
 
 
-@pytest.fixture(scope="module")
-def store(tmp_path_factory):
-    """Final poses of long pushes with the true values; the store assumes others."""
-    folder = tmp_path_factory.mktemp("identify")
-    made = generate(STROKES, folder / "made")
+def recorded(folder, config, true):
+    """Return final poses of pushes with true values; their store assumes others."""
+    made = generate(config, folder / "made")
     arrays, info = made.read(slice(None)), made.info
     friction = np.full(info.pushes, 0.25, np.float32)
     arrays |= {"pusher_friction": friction, "disk_friction": friction}
     arrays |= {"table_friction": np.full(info.pushes, 0.15, np.float32)}
     scene, engine = with_values(
-        to_scene(arrays, info), {k: jnp.float32(v) for k, v in TRUE.items()}
+        to_scene(arrays, info), {k: jnp.float32(v) for k, v in true.items()}
     )
-    offset = jnp.array([TRUE[name] for name in OFFSET]) / 1000
+    offset = jnp.array([true[name] for name in OFFSET]) / 1000
     initial = to_initial(arrays).with_pusher_moved(offset)
     controls = to_controls(arrays, info).moved(offset)
     motion, _ = from_trajectory(
@@ -78,6 +76,11 @@ def store(tmp_path_factory):
     (folder / "data").mkdir()
     write_store(folder / "data", info, seen)
     return open_store(folder / "data")
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("identify"), STROKES, TRUE)
 
 
 @pytest.fixture(scope="module")
@@ -122,6 +125,20 @@ def test_unidentifiable_parameters_keep_their_initial_values(found):
     # A pushed disk goes the same way on any table, as long as it does not coast.
     assert table.doubt is not None
     assert table.value == table.start == pytest.approx(0.15)
+
+
+def test_initial_values_that_pushes_contradict_are_not_kept(tmp_path):
+    """Where no push slips, friction may be high, but not the initial value of 0.25."""
+    true = {"pusher_friction": 0.6, "pressure_radius_ratio": 0.8, **OFFSET}
+    config = replace(STROKES, direction_deg=42.0)
+    found = {e.name: e for e in identify(recorded(tmp_path, config, true)).estimates}
+    friction = found["pusher_friction"]
+    assert friction.high > 3 * friction.low  # vague
+    assert friction.doubt is None
+    assert friction.value > 0.3
+    assert found["table_friction"].value == found["table_friction"].start
+    for name in true.keys() - {"pusher_friction"}:
+        assert found[name].low < true[name] < found[name].high
 
 
 @pytest.fixture(scope="module")

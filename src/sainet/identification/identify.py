@@ -3,6 +3,7 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +14,6 @@ from sainet.datasets.groups import groups_of
 from sainet.datasets.store import Store
 from sainet.engines.simulator import OwnSpec, SimulatorSpec
 from sainet.identification.parameters import (
-    BOUNDS,
     FRICTIONS,
     NAMES,
     PLANAR,
@@ -23,10 +23,11 @@ from sainet.identification.parameters import (
     from_coordinate,
     names_for,
     starting_values,
-    to_coordinate,
+    to_coordinates,
     to_engine,
 )
 from sainet.identification.residuals import (
+    LEAST_PUSHES,
     Sample,
     Scale,
     intervals,
@@ -44,44 +45,93 @@ from sainet.runs.folders import open_run
 Try = Callable[[float], None]  # called with the root mean square of all errors
 
 _INSIDE = 1e-3  # distance of initial coordinates from the bounds
+_WORSE = 0.5  # increase of the loss by values that pushes contradict (fraction)
+_Interval = tuple[float, float]
 
 
-def solve(
-    start: Mapping[str, float],
-    free: Sequence[str],
-    scale: Scale,
-    parts: Sequence[Sample],
-    *,
-    on_try: Try,
-) -> dict[str, float]:
-    """Return all values, with the free parameters at the least-squares solution."""
-    bounds = bounds_of(free)
-    before = {name: to_coordinate(name, value) for name, value in start.items()}
+class _Problem(NamedTuple):
+    """Pushes that an engine is fitted to."""
 
-    def at(vector: np.ndarray) -> dict[str, float]:
-        return before | dict(zip(free, vector.tolist(), strict=True))
+    start: dict[str, float]  # initial values
+    scale: Scale
+    parts: Sequence[Sample]
+    on_try: Try
 
-    def residual(vector: np.ndarray) -> np.ndarray:
-        found = [residuals(at(vector), scale, part).ravel() for part in parts]
-        whole = np.concatenate(found)
-        on_try(float(np.sqrt(np.mean(whole**2))))
-        return whole
+    def solved(self, free: Sequence[str]) -> dict[str, float]:
+        """Return all values, with the free parameters at the least-squares solution."""
+        if not free:
+            return self.start
+        bounds, before = bounds_of(free), to_coordinates(self.start)
 
-    def slope(vector: np.ndarray) -> np.ndarray:
-        found = [slopes(at(vector), free, scale, part) for part in parts]
-        return np.concatenate([part.reshape(-1, len(free)) for part in found])
+        def at(vector: np.ndarray) -> dict[str, float]:
+            return before | dict(zip(free, vector.tolist(), strict=True))
 
-    solution = least_squares(
-        residual,
-        np.clip(
-            [before[name] for name in free], bounds[0] + _INSIDE, bounds[1] - _INSIDE
-        ),
-        slope,  # pyright: ignore[reportArgumentType]
-        bounds=bounds,
-        loss="soft_l1",
-        x_scale="jac",
+        def residual(vector: np.ndarray) -> np.ndarray:
+            whole = np.concatenate([each.ravel() for each in self._errors(at(vector))])
+            self.on_try(float(np.sqrt(np.mean(whole**2))))
+            return whole
+
+        def slope(vector: np.ndarray) -> np.ndarray:
+            found = (slopes(at(vector), free, self.scale, part) for part in self.parts)
+            return np.concatenate([each.reshape(-1, len(free)) for each in found])
+
+        inside = bounds[0] + _INSIDE, bounds[1] - _INSIDE
+        solution = least_squares(
+            residual,
+            np.clip([before[name] for name in free], *inside),
+            slope,  # pyright: ignore[reportArgumentType]
+            bounds=bounds,
+            loss="soft_l1",
+            x_scale="jac",
+        )
+        return {name: from_coordinate(name, x) for name, x in at(solution.x).items()}
+
+    def contradicts(self, values: dict[str, float], best: dict[str, float]) -> bool:
+        """Return whether values fit clearly worse, whichever three pushes are left out.
+
+        Args:
+            values: of all parameters.
+            best: those of a least-squares solution.
+        """
+        cost, least = (
+            np.concatenate([np.sqrt(1 + e**2).sum(axis=1) - e.shape[1] for e in errors])
+            for errors in map(self._errors, map(to_coordinates, (values, best)))
+        )
+        more = np.sort(cost - least)[: 1 - LEAST_PUSHES]
+        return bool(more.sum() > _WORSE * least.sum())
+
+    def _errors(self, at: Mapping[str, float]) -> list[np.ndarray]:
+        return [residuals(at, self.scale, part) for part in self.parts]
+
+
+def _estimates(problem: _Problem) -> tuple[Estimate, ...]:
+    """Return the estimates of all parameters.
+
+    Doubtful ones keep their initial values, unless the pushes contradict these: where
+    none slips, friction may be anything but low.
+    """
+    start, values = problem.start, problem.solved([*problem.start])
+    known, needed = dict[str, _Interval](), set[str]()
+    doubtful: dict[str, tuple[str, _Interval]] = {}
+    while len(doubtful) < len(start):
+        free = [name for name in start if name not in doubtful]
+        known = intervals(values, free, problem.scale, problem.parts)
+        doubts = {n: doubt(n, values[n], *known[n]) for n in free if n not in needed}
+        new = {name: (why, known[name]) for name, why in doubts.items() if why}
+        if not new:
+            break
+        kept = problem.solved([name for name in free if name not in new])
+        if not problem.contradicts(kept, values):
+            doubtful, values = doubtful | new, kept
+            continue
+        each = {name: problem.solved([n for n in free if n != name]) for name in new}
+        wrong = {name for name in new if problem.contradicts(each[name], values)}
+        needed |= wrong or {*new}
+    return tuple(
+        Estimate(name, value, *interval, start[name], why)
+        for name, value in values.items()
+        for why, interval in [doubtful.get(name) or (None, known[name])]
     )
-    return {name: from_coordinate(name, x) for name, x in at(solution.x).items()}
 
 
 _log = logging.getLogger(__name__)
@@ -143,8 +193,8 @@ def identify(
     Nonlinear least squares (SciPy, robust against outliers) on the position and
     rotation errors at the observed steps, divided by the initial errors of the engine.
     The 95 % intervals are a bootstrap over pushes, with one Gauss-Newton step for each
-    resample. Parameters that are not identifiable keep their initial values, and the
-    others are estimated again.
+    resample. Parameters that are not identifiable keep their initial values, unless the
+    pushes contradict these, and the others are estimated again.
 
     Args:
         store: pushes along paths, with observed final poses at least.
@@ -163,23 +213,12 @@ def identify(
     start = starting_values(scenes, names_for(scenes[0], simulator))
     _tell_of_one_value(store, start)
     before, scale = _mean_errors(start, parts), _scale(start, parts)
-    values, known, doubtful = start, {}, {}
-    while len(doubtful) < len(start):
-        free = [name for name in start if name not in doubtful]
-        values = solve(start, free, scale, parts, on_try=on_try)
-        known = intervals(values, free, scale, parts)
-        doubts = {name: doubt(name, values[name], *known[name]) for name in free}
-        new = {name: (why, known[name]) for name, why in doubts.items() if why}
-        if not new:
-            break
-        doubtful, values = doubtful | new, start
+    estimates = _estimates(_Problem(start, scale, parts, on_try))
+    values = {each.name: each.value for each in estimates}
     after = _mean_errors(values, parts)
     return Identified(
         engine=to_engine(values, simulator),
-        estimates=tuple(
-            _estimate(name, values[name], start[name], known, doubtful)
-            for name in start
-        ),
+        estimates=estimates,
         pushes=sum(len(part.steps) for part in parts),
         before_mm=before[0],
         after_mm=after[0],
@@ -210,17 +249,6 @@ def _tell_of_one_value(store: Store, start: Mapping[str, float]) -> None:
                 "these values, or their mean if it is not identifiable.",
                 *(store.path, name, values.min(), values.max()),
             )
-
-
-def _estimate(
-    name: str,
-    value: float,
-    start: float,
-    known: Mapping[str, tuple[float, float]],
-    doubtful: Mapping[str, tuple[str, tuple[float, float]]],
-) -> Estimate:
-    why, interval = doubtful.get(name, (None, known.get(name, BOUNDS[name])))
-    return Estimate(name, value, *interval, start, why)
 
 
 def _raw_errors(values: Mapping[str, float], part: Sample) -> np.ndarray:

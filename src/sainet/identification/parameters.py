@@ -42,6 +42,11 @@ def to_coordinate(name: str, value: float) -> float:
     return value if name in CAMERA else math.log(value)
 
 
+def to_coordinates(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the optimised coordinate of each value."""
+    return {name: to_coordinate(name, value) for name, value in values.items()}
+
+
 def from_coordinate(name: str, coordinate: float) -> float:
     """Return the value at a coordinate."""
     return coordinate if name in CAMERA else math.exp(coordinate)
@@ -134,12 +139,8 @@ def to_engine(
 ) -> InternalEngine:
     """Return the engine with estimated parameters; masses and radii are the scene's."""
     x, y = (values.get(name, 0.0) / 1000 for name in CAMERA)
-    assumptions = Assumptions(
-        pusher_friction=values.get("pusher_friction"),
-        disk_friction=values.get("disk_friction"),
-        table_friction=values.get("table_friction"),
-    )
-    found = replace(simulator, assumptions=assumptions)
+    assumed = replace(Assumptions(), **{name: values.get(name) for name in FRICTIONS})
+    found = replace(simulator, assumptions=assumed)
     if RATIO in values:
         found = replace(found, pressure_radius_ratio=values[RATIO])
     return InternalEngine(found, CameraOffset(x=x, y=y))

@@ -20,7 +20,7 @@ from sainet.identification.parameters import (
     bounds_of,
     camera_at,
     from_coordinate,
-    to_coordinate,
+    to_coordinates,
     values_at,
     with_values,
 )
@@ -151,7 +151,7 @@ _BOOTSTRAP = 0x1DE47
 _RIDGE = 1e-6  # fraction of all curvature, below which a parameter has no effect
 # A resample contains none of k pushes with a probability below e^-k, and then its step
 # is zero: from four pushes on, this is rarer than either tail of the interval.
-_LEAST_PUSHES = 4
+LEAST_PUSHES = 4
 
 
 def intervals(
@@ -165,7 +165,7 @@ def intervals(
     A parameter that affects fewer than four pushes has the whole search range as its
     interval: pushes with zero slope resample to zero steps, a false certainty.
     """
-    at = {name: to_coordinate(name, value) for name, value in values.items()}
+    at = to_coordinates(values)
     matrices, vectors = [], []
     for part in parts:
         error, slope = residuals(at, scale, part), slopes(at, free, scale, part)
@@ -192,7 +192,7 @@ def intervals(
 def _is_identifiable(matrix: Float[np.ndarray, "push p p"]) -> Bool[np.ndarray, " p"]:
     """Return whether a parameter affects more than its three most affected pushes."""
     curvature = np.sort(np.einsum("pii->pi", matrix), axis=0)
-    return curvature[: 1 - _LEAST_PUSHES].sum(axis=0) > _ridge(matrix)
+    return curvature[: 1 - LEAST_PUSHES].sum(axis=0) > _ridge(matrix)
 
 
 def _ridge(matrix: Float[np.ndarray, "push p p"]) -> float:

@@ -75,9 +75,7 @@ def import_table(
         count = len(table.texts["push"].names)
         settings |= {"skip_bad": True, "left_out": count - len(recordings)}
         problems.warn(path, count - len(recordings), count)
-    return import_pushes(
-        out, settings, [resample(recording) for recording in recordings], bodies
-    )
+    return import_pushes(out, settings, [*map(resample, recordings)], bodies)
 
 
 def _read(path: Path, data: bytes, problems: Problems) -> tables.Table:
@@ -166,21 +164,22 @@ class _Push:
     bodies: tuple[str, ...]
     rows: list[Int[np.ndarray, " _"]]  # of each body
 
-    def column(self, name: str, body: int) -> Float[np.ndarray, " sample"]:
-        return self.table.numbers[name][self.rows[body]]
+    def columns(self, body: int, *names: str) -> Float[np.ndarray, "sample _"]:
+        numbers, rows = self.table.numbers, self.rows[body]
+        return np.column_stack([numbers[name][rows] for name in names])
+
+    def time(self, body: int) -> Float[np.ndarray, " sample"]:
+        return self.columns(body, "time")[:, 0]
 
     def pusher(self, body: int) -> Float[np.ndarray, "sample 2"]:
-        return np.column_stack([self.column(f"pusher_{axis}", body) for axis in "xy"])
+        return self.columns(body, "pusher_x", "pusher_y")
 
     @property
     def is_in_range(self) -> bool:
         """Whether all places and angles are in range; else a unit is mistaken."""
-        rows, numbers = np.concatenate(self.rows), self.table.numbers
-        places = np.abs([numbers[name][rows] for name in _PLACES])
-        angles = np.abs(numbers["angle"][rows])
-        return bool(
-            (places <= checks.PLACE.high).all() and (angles <= checks.ANGLE.high).all()
-        )
+        most = dict.fromkeys(_PLACES, checks.PLACE.high) | {"angle": checks.ANGLE.high}
+        known = [self.columns(body, *most) for body in self._indices]
+        return bool((np.abs(np.concatenate(known)) <= [*most.values()]).all())
 
     def is_sound(self, problems: Problems) -> bool:
         """Return whether all bodies have the same rising times and the same pusher."""
@@ -209,7 +208,7 @@ class _Push:
         if not len(rows):
             text = f"{named} is missing; all pushes of a file need the same bodies"
             return "missing body", self.rows[first][0], text
-        time, wanted = self.column("time", body), self.column("time", first)
+        time, wanted = self.time(body), self.time(first)
         fall = checks.first_fall(time)
         if fall is not None:
             same = time[fall] == time[fall - 1]
@@ -245,18 +244,13 @@ class _Push:
                 problems.add(column, line, of_push=True)
                 return None
             labels[column] = text.names[text.code[rows[0]]]
-        pose = np.stack(
-            [
-                np.column_stack([self.column(n, b) for n in ("x", "y", "angle")])
-                for b in self._indices
-            ],
-            axis=1,
-        )
+        poses = [self.columns(body, "x", "y", "angle") for body in self._indices]
+        pose = np.stack(poses, axis=1)
         pose[..., 2] = np.unwrap(pose[..., 2], axis=0)
         # A push has the same hash whatever the turn that its angles are counted in.
         pose[..., 2] -= 2 * np.pi * np.rint(pose[0, :, 2] / (2 * np.pi))
         return Recording(
-            time=self.column("time", 0),
+            time=self.time(0),
             pose=pose,
             pusher=self.pusher(0),
             conditions=Conditions(surface=labels["group"]),

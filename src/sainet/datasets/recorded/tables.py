@@ -51,13 +51,9 @@ class Columns:
         }
         for what, names in wrong.items():
             if names:
-                hints = [_hint(n, unknown) if what == "missing" else "" for n in names]
-                named = ", ".join(
-                    n + hint for n, hint in zip(names, hints, strict=True)
-                )
-                verb = (
-                    f"column {named} is" if len(names) == 1 else f"columns {named} are"
-                )
+                hints = [_hint(n, unknown) * (what == "missing") for n in names]
+                named = ", ".join(map(str.__add__, names, hints))
+                verb = f"columns {named} are" if names[1:] else f"column {named} is"
                 line = f"{path}: row 1: {verb} {what}.{self.note}"
                 problems.add(f"columns {what}", line)
         return not (wrong["missing"] or wrong["there twice"])
@@ -187,8 +183,8 @@ class _Reader:
         self.header = header
         texts = (*self.columns.texts, *self.columns.optional)
         self.texts = {name: (array("q"), {}) for name in texts if name in header}
-        named = [name for name in self.columns.numbers if name in header]
-        self.numbers = {name: array("d") for name in named}
+        numbers = self.columns.numbers
+        self.numbers = {name: array("d") for name in numbers if name in header}
 
     def read_row(self, line: int, fields: list[str]) -> None:
         where = f"{self.path}: row {line}"
