@@ -87,6 +87,30 @@ def test_long_pushes_count_to_their_ends():
     assert np.allclose(found.radius, TRUE.radius, rtol=0.01)
 
 
+def begun_late(recording, wait):
+    """The recording of a robot that holds still for some steps, then pushes."""
+    first = lambda x: np.concatenate([np.repeat(x[:1], wait, axis=0), x])  # noqa: E731
+    time = np.arange(len(recording.time) + wait) / 240
+    pose, pusher = first(recording.pose), first(recording.pusher)
+    return replace(recording, time=time, pose=pose, pusher=pusher)
+
+
+def test_recordings_that_begin_before_the_contact_count_to_their_ends():
+    adaptation = Adaptation(load_model("physics-true"), wrong(TRUE, (0.95, 1.05)))
+    for push in PUSHES:
+        adaptation.add(begun_late(recording_of(TRUE, *push), wait=60))
+    _, found = adaptation.adapted(TRUE.in_a_row())
+    assert np.allclose(found.radius, TRUE.radius, rtol=0.005)
+
+
+def test_the_time_step_of_the_scene_is_only_that_of_predictions():
+    given = wrong(TRUE, (0.95, 1.05))
+    _, usual = after(given, [TRUE] * 6)
+    _, found = after(replace(given, time_step=1 / 120), [TRUE] * 6)
+    assert found.time_step == 1 / 120
+    assert np.allclose(found.radius, usual.radius, rtol=1e-6)
+
+
 def test_properties_without_effect_stay_as_given():
     """In slow pushing only the ratio of masses has an effect, not their size."""
     given = wrong(TRUE, mass=(1.1, 1.1))

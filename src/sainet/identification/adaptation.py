@@ -8,7 +8,7 @@ prediction errors of the planar engine, as in `identify`.
 """
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import equinox as eqx
@@ -28,13 +28,15 @@ from sainet.models.model import Model
 from sainet.models.wrappers import with_camera
 from sainet.runs.errors import BadInput
 from sainet.scenes.controls import PathControls
-from sainet.scenes.pushes import settled_steps
+from sainet.scenes.pushes import Push, settled_steps
 from sainet.scenes.recording import AGREES, CameraOffset, Recording
 from sainet.scenes.scene import TIME_STEP, Scene, pair_gaps
-from sainet.scenes.state import State, at_rest
+from sainet.scenes.state import State, at_rest, pack_motion
 
 REMEMBERED = 24  # pushes: older ones are forgotten, because surfaces change
 _UNKNOWN = 80  # steps after which everything rests, of an unknown push
+_BRAKING = 16  # steps, at least, that disks slide after the pusher has stopped
+_STILL = 5e-4  # m, from its end: the pusher has stopped
 _BUCKET = 80  # steps: arrays are a multiple, so that few sizes are compiled
 # Standard deviations of the prior, of logarithms.
 PRIOR = {"radius": 0.08, "mass": 0.1, "friction": 0.4, "pressure": 0.2}
@@ -116,6 +118,17 @@ class _Settled(NamedTuple):
         return self.push.pusher[np.minimum(np.arange(steps), last)]
 
 
+def _settled(push: ResampledPush, sent: Push | None) -> _Settled:
+    """Return a push with the steps of the command, or more where it began late.
+
+    A physical robot begins to move before the contact, and follows with a delay.
+    """
+    steps = settled_steps(sent, TIME_STEP) if sent else _UNKNOWN
+    away = np.linalg.norm(push.pusher - push.pusher[-1], axis=-1)
+    stopped = int(np.flatnonzero(away > _STILL).max(initial=-1)) + 2
+    return _Settled(push, max(steps, stopped + _BRAKING))
+
+
 def check_adapts(model: Model) -> None:
     """Raise `BadInput` if a model is physics without the planar engine."""
     simulator = model.internal and model.internal.simulator
@@ -155,6 +168,8 @@ class Adaptation:
         ratio, scene = UNIFORM_PRESSURE, self.scene
         if isinstance(spec, PlanarSpec) and not is_learned:
             ratio, scene = spec.pressure_radius_ratio, spec.build().assume(scene)
+        # Recordings are resampled at this time step, whatever that of the scene.
+        scene = replace(scene, time_step=TIME_STEP)
         self._given = _Given(scene, jnp.float32(ratio))
         self._is_learned = is_learned
         self.found = Properties.none(scene.body_count)
@@ -167,10 +182,9 @@ class Adaptation:
         """
         if recording.trouble:
             return
-        push, sent = resample(recording), recording.commanded
+        push = resample(recording)
         if push.steps >= 1 and np.isfinite(push.motion[..., :3]).all(axis=(1, 2)).any():
-            steps = settled_steps(sent, TIME_STEP) if sent else _UNKNOWN
-            self._pushes.append(_Settled(push, steps))
+            self._pushes.append(_settled(push, recording.commanded))
 
     def adapted(self, state: State) -> tuple[AbstractDynamics, Scene]:
         """Return model and scene with the properties estimated from the pushes so far.
@@ -179,12 +193,13 @@ class Adaptation:
             state: observed before the next push. Where two disks overlap in it, the
                 estimated radii are reduced.
         """
-        pushes = self._remembered()
-        self.found = _most_probable(self.found, self._given, pushes, _poses(state))
+        seen = jnp.asarray(pack_motion(state)[None, :, :3], jnp.float32)
+        self.found = _most_probable(self.found, self._given, self._remembered(), seen)
         scene = self.found.scene(self._given.scene)
+        scene = replace(scene, time_step=self.scene.time_step)
         if self._is_learned:
             return self.model.dynamics, scene
-        engine = AssumedProperties(self.found.engine(self._given.ratio), _NOTHING)
+        engine = AssumedProperties(self.found.engine(self._given.ratio), Assumptions())
         return with_camera(PhysicsDynamics(engine), self._camera), scene
 
     @property
@@ -196,8 +211,7 @@ class Adaptation:
         """Return the pushes, all in the coordinates of the camera."""
         offset = np.array(self._camera.vector)
         apart = _apart(self._given.scene.body_count)
-        shape = (REMEMBERED, *apart.shape)
-        start, end = np.broadcast_to(apart, (2, *shape)).copy()
+        start, end = np.broadcast_to(apart, (2, REMEMBERED, *apart.shape)).copy()
         pusher, weight = np.full((REMEMBERED, 2), -1.0), np.zeros(REMEMBERED)
         longest = max((each.steps for each in self._pushes), default=_BUCKET)
         steps = -(-longest // _BUCKET) * _BUCKET
@@ -211,17 +225,9 @@ class Adaptation:
         return _Pushes(*(jnp.asarray(each, jnp.float32) for each in arrays))
 
 
-_NOTHING = Assumptions()
-
-
 def _apart(bodies: int) -> Float[np.ndarray, "body 3"]:
     """Return poses of disks that nothing touches."""
     return np.stack([np.arange(bodies), np.zeros(bodies), np.zeros(bodies)], axis=-1)
-
-
-def _poses(state: State) -> Float[Array, "1 body 3"]:
-    pose = jnp.concatenate([state.position, state.angle[..., None]], axis=-1)
-    return jnp.asarray(pose, jnp.float32)[None]
 
 
 @eqx.filter_jit
@@ -272,10 +278,7 @@ def _errors(
     states = at_rest(
         poses[..., :2], poses[..., 2], jnp.full_like(poses[:, 0, :2], -1.0)
     )
-    gaps = pair_gaps(
-        jax.tree.map(lambda x: jnp.broadcast_to(x, (count + 1, *x.shape)), scene),
-        states,
-    )
+    gaps = jax.vmap(lambda each: pair_gaps(scene, each))(states)
     overlap = jnp.maximum(-gaps, 0.0) / OVERLAP_M
     weighted = missed * pushes.weight[:, None, None]
     return jnp.concatenate([weighted.ravel(), overlap.ravel()])
