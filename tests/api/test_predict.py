@@ -125,6 +125,17 @@ def test_vmap_over_pushes_equals_a_loop_and_a_batch(model):
     assert np.ptp(np.asarray(batch)[:, 0, 1]) > 1e-3
 
 
+def test_programs_of_double_precision_make_the_same_prediction(model):
+    state, push = SCENE.in_a_row(), sn.Push(np.array([0.2, -0.1]), 0.1)
+    usual = model.predict(SCENE, state, push, steps=60).final.position
+    with jax.enable_x64(True):
+        for kind in (jnp.float32, jnp.float64):
+            seen = jax.tree.map(lambda x, kind=kind: x.astype(kind), state)
+            push = sn.Push(np.array([0.2, -0.1]), 0.1)
+            found = model.predict(SCENE, seen, push, steps=60).final.position
+            assert np.allclose(found, usual, atol=1e-5)
+
+
 def test_vmap_over_whole_pushes_takes_200_steps():
     physics, pushes = sn.load("physics"), sn.Push(contact_angle=ANGLES)
     found = jax.vmap(lambda p: physics.predict(SCENE, SCENE.in_a_row(), p))(pushes)

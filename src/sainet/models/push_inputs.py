@@ -54,8 +54,7 @@ def steps_of(push: Push, time_step: float) -> int:
     if is_traced((push.length, push.speed)) or not push.length.size:
         return _USUAL_STEPS
     # Single-precision numbers as they were meant: 0.05, not 0.0500000007.
-    given = np.array([push.length, push.speed], np.float64)
-    length, speed = np.round(given.reshape(2, -1), 7)
+    length, speed = np.array([push.length, push.speed], float).reshape(2, -1).round(7)
     steps = RobotSetup().steps(length, speed).max()
     return int(np.ceil(steps * TIME_STEP / time_step - 1e-6))
 
@@ -92,14 +91,15 @@ def _axes(
 
 
 def widened(scene: Scene, state: State, push: Push | Controls) -> tuple[Any, ...]:
-    """Return the three, each with the leading axes of all."""
-    own = _axes(scene, state, push)
-    shape = np.broadcast_shapes(*own)
+    """Return the three, each with the leading axes and in the precision of all."""
+    own, parts = _axes(scene, state, push), (scene, state, push)
+    shape, kind = np.broadcast_shapes(*own), jnp.result_type(*jax.tree.leaves(parts))
 
     def widen(part: Any, axes: int) -> Any:  # noqa: ANN401
-        return jax.tree.map(lambda x: jnp.broadcast_to(x, shape + x.shape[axes:]), part)
+        as_wide = lambda x: jnp.broadcast_to(x, shape + x.shape[axes:])  # noqa: E731
+        return jax.tree.map(lambda x: as_wide(x).astype(kind), part)
 
-    return tuple(map(widen, (scene, state, push), map(len, own)))
+    return tuple(map(widen, parts, map(len, own)))
 
 
 def predict_push(

@@ -172,7 +172,7 @@ class Problem:
     @cached_property
     def pushes(self) -> Push:
         """The candidate pushes, on the host."""
-        return jax.device_get(self.grid.pushes())
+        return jax.tree.map(lambda x: np.asarray(x, np.float32), self.grid.pushes())
 
     @cached_property
     def steps(self) -> int:

@@ -51,12 +51,8 @@ class Draws:
 
     def push(self) -> Push:
         """Return the pushes."""
-        return Push(
-            contact_angle=_single(self.contact_angle),
-            direction=_single(self.direction),
-            length=_single(self.stroke),
-            speed=_single(self.speed),
-        )
+        drawn = self.contact_angle, self.direction, self.stroke, self.speed
+        return Push(*map(_single, drawn))
 
 
 def _single(values: np.ndarray) -> Array:

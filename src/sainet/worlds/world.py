@@ -1,9 +1,8 @@
 """The simulated world: executes pushes with noise and measures poses."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -42,17 +41,11 @@ class SimulatedWorld:
             return scene
         batch = scene.batch_shape
         features = friction_features(self.rng, math.prod(batch), self.noise)
-        field = FrictionField(
-            **{
-                name: jnp.asarray(
-                    values.reshape((*batch, *values.shape[1:])), jnp.float32
-                )
-                for name, values in features.items()
-            }
-        )
-        return eqx.tree_at(
-            lambda s: s.friction_field, scene, field, is_leaf=lambda x: x is None
-        )
+        shaped = {
+            name: jnp.asarray(x.reshape((*batch, *x.shape[1:])), jnp.float32)
+            for name, x in features.items()
+        }
+        return replace(scene, friction_field=FrictionField(**shaped))
 
     def execute(self, scene: Scene, initial: State, controls: Controls) -> Trajectory:
         """Return the states after each step of the controls with their errors.
