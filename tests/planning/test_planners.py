@@ -362,6 +362,38 @@ def test_overlapping_disks_are_refused(name):
     assert planner.plan(PHYSICS, FAR, SCENE, touching(-0.0005)).warnings == ()
 
 
+@pytest.mark.parametrize("bodies", [(3, 2), (1, 2), (2, 3)])
+def test_an_observation_of_another_number_of_disks_is_refused(bodies):
+    disks, seen = (Scene.disks([1.0] * count, 0.055) for count in bodies)
+    with pytest.raises(BadScene, match=rf"angles have the shape \[{bodies[1]}\]"):
+        make_planner("tree").plan(PHYSICS, FAR, disks, seen.in_a_row())
+
+
+def test_a_batch_of_observations_is_refused():
+    batch = jax.tree.map(lambda x: x[None], (SCENE, STATE))
+    for given in ((SCENE, batch[1]), (batch[0], STATE), batch):
+        with pytest.raises(BadScene, match="give one scene"):
+            make_planner("tree").plan(PHYSICS, FAR, *given)
+
+
+@pytest.mark.parametrize("goal", [[0.2, 0.0, 0.1], [0.2], 0.2, [[0.2, 0.0]]])
+def test_a_goal_that_is_no_point_of_the_table_is_refused(goal):
+    with pytest.raises(BadScene, match="task: goal has the shape"):
+        make_planner("tree").plan(PHYSICS, PushToGoal(goal), SCENE, STATE)
+
+
+@every_planner
+def test_programs_of_double_precision_find_the_same_plan(name):
+    planner = eqx.tree_at(lambda p: p.actions, make_planner(name), FEW)
+    usual = planner.plan(PHYSICS, FAR, SCENE, STATE)
+    with jax.enable_x64(True):
+        for kind in (jnp.float32, jnp.float64):
+            seen = jax.tree.map(lambda x, kind=kind: x.astype(kind), STATE)
+            plan = planner.plan(PHYSICS, FAR, SCENE, seen)
+            assert np.allclose(plan.path, usual.path, atol=1e-6)
+            assert plan.evaluated == usual.evaluated
+
+
 @every_planner
 def test_a_model_without_finite_predictions_is_refused(name):
     network = quick_dynamics("in", "robot")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from planning.scenes import RADIUS, goal_ahead, scene, touching
-from sainet.runs.errors import BadScene
+from sainet.runs.errors import BadScene, BadSetting
 from sainet.scenes.geometry import rotate
 from sainet.scenes.state import at_rest
 from sainet.tasks.push_to_goal import draw_goal
@@ -62,6 +62,13 @@ def test_a_disk_at_nan_or_infinity_is_not_at_its_goal():
     lost = jax.tree.map(lambda x: x * jnp.nan, touching())
     assert not bool(goal_ahead(0.0).is_solved(scene(), lost))
     assert not jnp.isfinite(goal_ahead(0.0).distance(lost))
+
+
+@pytest.mark.parametrize("name", ["tolerance", "alignment"])
+@pytest.mark.parametrize("value", [-0.1, np.nan])
+def test_impossible_settings_are_refused(name, value):
+    with pytest.raises(BadSetting, match=f"`{name}` is "):
+        goal_ahead(0.0, **{name: value})
 
 
 def test_a_disk_on_its_goal_costs_only_its_alignment():

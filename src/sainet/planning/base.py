@@ -73,8 +73,8 @@ class AbstractPlanner(eqx.Module):
             state: observed state, assumed to be at rest.
 
         Raises:
-            BadScene: the observation is not finite, disks overlap, or the scene has no
-                target disk.
+            BadScene: the observation is not finite or not of this scene, disks overlap,
+                the scene has no target disk, or the goal is none of the table.
             BadCheckpoint: the model is for another time step or other controls.
             Diverged: no candidate push has a finite prediction.
         """

@@ -22,9 +22,15 @@ def check_observation(scene: Scene, state: State) -> float:
     """Return the smallest gap between two disks (m), infinite for a single disk.
 
     Raises:
-        BadScene: the observation is not finite, or disks overlap.
+        BadScene: the observation is not finite or not of the scene, or disks overlap.
     """
     check_state(state, "observation")
+    seen, known = list(np.shape(state.angle)), list(np.shape(scene.mass))
+    if seen != known or len(known) != 1:
+        raise BadScene(
+            f"observation: its angles have the shape {seen}, the scene's masses "
+            f"{known}; give one scene, and one pose for each of its disks."
+        )
     gap = float(np.min(np.asarray(_compiled_gaps(scene, state)), initial=np.inf))
     if gap < -_DEEPEST_OVERLAP:
         raise BadScene(

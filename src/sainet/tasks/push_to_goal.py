@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from sainet.runs.errors import BadScene
+from sainet.scenes import quantities
 from sainet.scenes.geometry import norm
 from sainet.scenes.pushes import PushGrid
-from sainet.scenes.quantities import POSITION
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, floats
 from sainet.tasks import Goals
@@ -80,6 +80,11 @@ class PushToGoal(AbstractTask):
     alignment: float = eqx.field(static=True, default=ALIGNMENT)
     steering: Steering | None = None
 
+    def __check_init__(self) -> None:
+        """Refuse impossible settings."""
+        quantities.FRACTION.require("tolerance", self.tolerance)
+        quantities.ALIGNMENT.require("alignment", self.alignment)
+
     def distance(self, state: State) -> Float[Array, "*batch"]:
         """Return the distance of the target disk from the goal (m).
 
@@ -113,10 +118,13 @@ class PushToGoal(AbstractTask):
         """Return the task with the steering of its row, if there is one.
 
         Raises:
-            BadScene: the scene has no such disk, or the goal is out of range.
+            BadScene: the scene has no such disk, or the goal is not one in range.
         """
         self._moved(state)
-        POSITION.check(self.goal, "task: goal", error=BadScene)
+        quantities.POSITION.check(self.goal, "task: goal", error=BadScene)
+        if np.shape(self.goal) != (2,):
+            shape = list(np.shape(self.goal))
+            raise BadScene(f"task: goal has the shape {shape}; give x and y (m).")
         if self.moved < _ROW:
             return self
         miss = max(self.tolerance, 1e-3) * float(scene.radius[self.moved])
