@@ -1,6 +1,7 @@
 """The planar engine: its two solvers, and a slow reference written from the physics."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from sainet.engines.base import roll_out
 from sainet.engines.planar import solver
 from sainet.engines.planar.engine import PlanarEngine
 from sainet.engines.planar.solver import contact_budget, solve_close_pairs
-from sainet.scenes.scene import FrictionField, pair_gaps, pusher_gaps
+from sainet.scenes.pushes import Push, command_path
+from sainet.scenes.scene import FrictionField, Scene, pair_gaps, pusher_gaps
 
 STEPS = 50
 
@@ -119,6 +121,22 @@ def test_more_sweeps_reduce_the_overlap_of_five_disks():
         deepest.append(-min(disks, np.asarray(pusher_gaps(scenes, states)).min()))
     assert deepest[1] < 1e-5
     assert deepest[1] < deepest[0]
+
+
+@pytest.mark.parametrize(
+    ("mass", "sweeps", "deepest"),
+    [(1.0, 10, 1e-6), (0.3, 10, 3e-5), (0.1, 10, 2.2e-4), (0.1, 100, 1e-6)],
+)
+def test_a_pusher_overlaps_a_light_disk_that_pushes_a_heavy_disk(mass, sweeps, deepest):
+    """As `docs/limits.md` states it."""
+    scene = Scene.disks(mass=[mass, 1.0], radius=0.055)
+    push = command_path(scene, scene.in_a_row(), Push(0.2, 0.1), steps=160)
+    states = roll_out(PlanarEngine(sweeps=sweeps), scene, *push).states
+    scenes = jax.tree.map(lambda x: jnp.broadcast_to(x, (160, *x.shape)), scene)
+    overlap = -float(pusher_gaps(scenes, states).min())
+    assert overlap < deepest
+    if sweeps == 10 and mass < 1.0:
+        assert overlap > 0.7 * deepest
 
 
 def test_a_step_is_the_first_of_a_rollout():
