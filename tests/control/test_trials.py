@@ -25,6 +25,7 @@ from sainet.control.trial import make_trial
 from sainet.control.trials import measure_trials, prepare, run_share, run_trials
 from sainet.evaluation import summary
 from sainet.evaluation.claims import solves_more
+from sainet.evaluation.intervals import wilson
 from sainet.evaluation.measurements import Measurements
 from sainet.evaluation.trials import MEASURES, compare_trials, trial_rows
 from sainet.models.identity import ModelId
@@ -492,6 +493,14 @@ def test_trials_of_one_lab_are_not_independent():
     (p,) = (test.p for test in found.tests if test.measure == "solved")
     assert p > 0.05
     assert any(f"(p over labs = {p:.2g})" in each for each in trial_sentences(found))
+    # Success scatters over labs, as its complement does: Wilson's interval is narrower.
+    for row, outcome in zip(found.trials, found.outcomes, strict=True):
+        solved = outcome.values["solved"]
+        assert row.interval == pytest.approx((solved.low, solved.high))
+        assert np.ptp(row.interval) > 1.5 * np.ptp(wilson(row.success, 100))
+    # Where no trial differs, Wilson's.
+    never = found.outcomes[0].values["stuck"]
+    assert (never.low, never.high) == pytest.approx(wilson(0.0, 100))
 
 
 def test_pairs_are_compared_by_each_measure():

@@ -189,7 +189,9 @@ def _coverage(
     inside, size, score, plain = map(sample, (INSIDE, SIZE, SCORE, PLAIN))
     if not np.isfinite(inside.values).all() or not part.any():
         return []
-    intervals = (inside.percentage, size.interval, score.interval, score.over(plain))
+    share, low, high = inside.share
+    percentage = 100 * share, 100 * low, 100 * high
+    intervals = (percentage, size.interval, score.interval, score.over(plain))
     return [
         Coverage(
             condition=condition.label,

@@ -101,8 +101,8 @@ class Sample:
         return self._interval(self.mean, self.drawn())
 
     @property
-    def percentage(self) -> Interval:
-        """Shares in percent: Wilson's interval, or that over folds and trainings.
+    def share(self) -> Interval:
+        """Shares: Wilson's interval, or that over folds or labs and trainings.
 
         A bootstrap of pushes that all count, or none of them, has no width.
         """
@@ -111,7 +111,7 @@ class Sample:
         takes_wilson = np.isfinite(ends[0]) & (is_plain | (share == 0) | (share == 1))
         bounds = wilson(share, self.values.shape[-2])
         low, high = np.clip(np.where(takes_wilson, bounds, ends), 0, 1)
-        return 100 * share, 100 * low, 100 * high
+        return share, low, high
 
     def minus(self, other: "Sample") -> Interval:
         """Return the differences of the means over the same pushes."""

@@ -32,16 +32,20 @@ class TrialDifference(msgspec.Struct, frozen=True, kw_only=True):
     difference: Estimate
 
 
-# Means over labs and trials: shares of trials, a number of pushes, a distance.
+# Means over labs and trials: shares of trials, and amounts.
 OUTCOMES = ("solved", "within_2_mm", "pushes", "overshoot_mm", "stuck")
+_AMOUNTS = ("pushes", "overshoot_mm")
 
 
 def trial_outcomes(measured: Measurements) -> Iterator[TrialOutcome]:
     """Yield the means of every outcome with their intervals over labs and trials."""
     for condition, samples in _in_labs(measured):
         for slug, sample in samples.items():
-            found = sample.interval
-            values = {name: estimate(found, n) for n, name in enumerate(OUTCOMES)}
+            shares = Sample(np.clip(sample.values, 0, 1), sample.folds).share
+            found = dict.fromkeys(OUTCOMES, shares) | dict.fromkeys(
+                _AMOUNTS, sample.interval
+            )
+            values = {name: estimate(found[name], n) for n, name in enumerate(OUTCOMES)}
             yield TrialOutcome(condition=condition.label, model=slug, values=values)
 
 

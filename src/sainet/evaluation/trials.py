@@ -25,7 +25,7 @@ class TrialRow(msgspec.Struct, frozen=True, kw_only=True):
     trials: int
     solved: int
     success: float
-    interval: tuple[float, float]  # Wilson, 95 %
+    interval: tuple[float, float]  # 95 %: Wilson's, or over labs
     median_pushes: float | None  # of solved trials
     median_decision_s: float | None
     within_4_mm: float
@@ -90,7 +90,11 @@ def _row(measured: Measurements, slug: str, condition: Condition) -> TrialRow:
     )
     seconds = column("decision_s")
     seconds = seconds[np.isfinite(seconds)]
-    low, high = wilson(solved.mean(), len(solved))
+    labs = _labs(measured, condition)
+    if labs is None:
+        low, high = wilson(solved.mean(), len(solved))
+    else:
+        _, (low,), (high,) = Sample(solved[:, None].astype(float), labs).share
     pushes = column("pushes")[solved]
     return TrialRow(
         condition=condition.label,
@@ -121,9 +125,15 @@ def reached(
     return solved
 
 
-def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
+def _labs(measured: Measurements, condition: Condition) -> Folds | None:
+    """Return the labs of several trials; None if they are not of labs."""
     part = measured.data["fold"].values[measured.samples_of(condition)]
-    labs = folds_of(part, are_labs=True) if measured.header.has_labs else None
+    has_labs = measured.header.has_labs and len(part) > 1
+    return folds_of(part, are_labs=True) if has_labs else None
+
+
+def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
+    labs = _labs(measured, condition)
     tried = [s for s in measured.slugs if was_tried(measured, s, condition)]
     for measure in MEASURES:
         found = {s: reached(measured, s, condition, measure) for s in tried}
@@ -142,7 +152,7 @@ def _tests(measured: Measurements, condition: Condition) -> Iterator[TrialTest]:
 
 def _chance(mine: np.ndarray, theirs: np.ndarray, labs: Folds | None) -> float:
     """Return p, two-sided, that trials reach as much with either model."""
-    if labs and len(mine) > 1:
+    if labs:
         one, other = (Sample(x[:, None].astype(float), labs) for x in (mine, theirs))
         return max(float(one.chance(other)[0]), _agreeing(mine, theirs, labs))
     from scipy.stats import binomtest  # slow to import

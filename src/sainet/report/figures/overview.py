@@ -70,7 +70,7 @@ def draw_errors_over_physics(parts: Sequence[Part], path: Path) -> Path:
 
 
 def draw_success(parts: Sequence[Part], path: Path) -> Path:
-    """Draw the share of goals that each model solves, with Wilson's interval.
+    """Draw the share of goals that each model solves, with its interval.
 
     Args:
         parts: conditions of studies with trials, from top to bottom.
