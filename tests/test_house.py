@@ -394,7 +394,7 @@ COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
         lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
-        15_309,
+        15_231,
         11_000,
     ),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),
@@ -415,7 +415,7 @@ COUNTS = {
         # disk by disk and of ranges: 50 more. Leading axes of controls, bounds in
         # single precision, numbers of pushes and steps: 9. Predictions of pushes with
         # one hash, engines of one name, types of settings: 23.
-        3_748,
+        3_697,
         3_540,
     ),
     "code lines of engines from MJCF": (
@@ -440,7 +440,7 @@ COUNTS = {
     "code lines of cross-validation": (
         # Blocks of angles from the widest gap, folders of any surface: 13.
         lambda: sum(map(code_lines, modules_of(VALIDATION))),
-        613,
+        610,
         600,
     ),
     "code lines of choosing pushes": (
@@ -462,7 +462,7 @@ COUNTS = {
     "code lines of adaptation": (
         # Pushes of any length: 4.
         lambda: sum(map(code_lines, modules_of(ADAPTATION))),
-        254,
+        251,
         250,
     ),
     "code lines of claims with a margin": (
@@ -475,7 +475,7 @@ COUNTS = {
         # Two counts before, 715 and 130. Contact networks around the engine with
         # assumed properties: 23. Features that vary in no dataset of a mixture: 5.
         # Obstacles that are drawn again: 1.
-        851,
+        845,
         850,
     ),
     "code lines of the whole paper": (
@@ -497,7 +497,7 @@ COUNTS = {
     "code lines of the engineer's path": (
         # Rounding that is no variation, times of the ends of a stroke: 10.
         lambda: sum(map(code_lines, modules_of(ENGINEER))),
-        610,
+        606,
         600,
     ),
     "code lines of the page of an evaluation": (
@@ -520,7 +520,7 @@ COUNTS = {
         # Training that ends early only where it validates: 2. Members whose batches
         # differ in length: 16.
         lambda: sum(map(code_lines, modules_of(ON_GPU))),
-        843,
+        833,
         827,
     ),
     "code lines in tools": (lambda: sum(map(code_lines, TOOLS)), 150, 150),
