@@ -28,7 +28,14 @@ from sainet.identification.parameters import (
     to_engine,
     with_values,
 )
-from sainet.identification.residuals import Scale, intervals, residuals, samples, slopes
+from sainet.identification.residuals import (
+    Scale,
+    intervals,
+    pose_errors,
+    residuals,
+    samples,
+    slopes,
+)
 from sainet.models.card import IDENTIFIED, read_identified
 from sainet.models.library import find_internal_engine, load_model
 from sainet.runs.errors import BadInput, BadStore, RunConflict
@@ -331,6 +338,32 @@ def test_pushes_of_all_lengths_have_equal_weight(tmp_path, caplog):
     assert caplog.text.count("varies") == 1
     assert found.pushes == 8
     assert found.before_mm > 0
+
+
+def test_pushes_of_many_lengths_share_two_programs(tmp_path):
+    """Each would take seconds to compile; what follows the end of a push is unseen."""
+    arrays = made_up(info_of(9, bodies=1), lengths=[5, 6, 7, 8, 9, 10, 11, 12, 12])
+    store = write(tmp_path / "data", info_of(9, bodies=1), arrays)
+    parts = samples(store)
+    shapes = [part.inputs[0].measured.shape[:2] for part in parts]
+    assert shapes == [(2, 6), (7, 12)]
+    at = {name: jnp.float32(0.2) for name in ("pusher_friction", "table_friction")}
+    found = np.concatenate([pose_errors(at, *part.inputs)[:, -1] for part in parts])
+    for push in range(9):
+        (alone,) = samples(store.take([push]))
+        assert alone.batch.measured.shape[1] == arrays["steps"][push]
+        (end,) = pose_errors(at, *alone.inputs)[:, -1]
+        np.testing.assert_allclose(found[push], end, atol=1e-7)
+
+
+def test_rows_that_repeat_pushes_count_once(tmp_path):
+    store = write(tmp_path / "data", info_of(9), made_up(info_of(9)))
+    (part,) = samples(store)
+    assert part.inputs[0].measured.shape[0] == 10
+    at = {"pusher_friction": np.log(0.2)}
+    scale = Scale(1.0, 1.0)
+    assert residuals(at, scale, part).shape[0] == 9
+    assert slopes(at, tuple(at), scale, part).shape[0] == 9
 
 
 def test_equal_frictions_are_exactly_the_initial_value():

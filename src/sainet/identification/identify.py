@@ -253,7 +253,7 @@ def _tell_of_one_value(store: Store, start: Mapping[str, float]) -> None:
 
 def _raw_errors(values: Mapping[str, float], part: Sample) -> np.ndarray:
     tree = {name: jnp.float32(value) for name, value in values.items()}
-    return np.asarray(pose_errors(tree, *part.inputs))
+    return np.asarray(pose_errors(tree, *part.inputs))[: len(part.steps)]
 
 
 def _scale(values: Mapping[str, float], parts: Sequence[Sample]) -> Scale:

@@ -5,6 +5,7 @@ The intervals of the parameters are a bootstrap over pushes.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -27,20 +28,25 @@ from sainet.identification.parameters import (
 
 _LOOKS = 8  # observed poses of a push that are compared, evenly spaced
 _BATCH = 256  # pushes at a time
+_LENGTHS = 2  # at most: the engine is compiled for each
 
 
 @dataclass(frozen=True)
 class Sample:
-    """Pushes of one length, and the steps at which their poses are compared."""
+    """Pushes of similar length, and the steps at which their poses are compared."""
 
     batch: PushBatch
     steps: Int[np.ndarray, "push look"]  # observed steps, the last one repeated
     own: Own = None  # an engine of the user's own; None: the planar engine
 
-    @property
-    def inputs(self) -> tuple[PushBatch, Int[Array, "push look"], Own]:
-        """The last arguments of `pose_errors`."""
-        return self.batch, jnp.asarray(self.steps), self.own
+    @cached_property
+    def inputs(self) -> tuple[PushBatch, Int[Array, "row look"], Own]:
+        """The last arguments of `pose_errors`: rows of few numbers, with repeats."""
+        count = len(self.steps)
+        unit = 2 ** max((count - 1).bit_length() - 3, 0)
+        rows = np.resize(np.arange(count), -(-count // unit) * unit)
+        some = jax.tree.map(lambda x: x[rows], self.batch)
+        return some, jnp.asarray(self.steps[rows]), self.own
 
 
 @dataclass(frozen=True)
@@ -52,13 +58,16 @@ class Scale:
 
 
 def samples(store: Store, own: Own = None) -> list[Sample]:
-    """Return the observed pushes of a store, in batches of equal length.
+    """Return the observed pushes of a store, in batches of similar length.
 
     Args:
         store: of the pushes.
         own: an engine of the user's own; None: the planar engine.
     """
     lengths = store.read(slice(None), ("steps",))["steps"]
+    longest = int(lengths.max())
+    unit = -(-longest // _LENGTHS)
+    lengths = np.minimum(-(-lengths // unit) * unit, longest)
     found = []
     for length in np.unique(lengths):
         same = np.flatnonzero(lengths == length)
@@ -125,7 +134,7 @@ def residuals(
 ) -> Float[np.ndarray, "push number"]:
     """Return the scaled errors of each push (dimensionless)."""
     found = _residual(*_arguments(coordinates, (), scale, sample))
-    return np.asarray(found, np.float64)
+    return np.asarray(found, np.float64)[: len(sample.steps)]
 
 
 def slopes(
@@ -133,7 +142,8 @@ def slopes(
 ) -> Float[np.ndarray, "push number parameter"]:
     """Return forward-mode derivatives of the scaled errors by the free parameters."""
     found = _slope(*_arguments(coordinates, free, scale, sample))
-    return np.stack([np.asarray(found[name], np.float64) for name in free], axis=-1)
+    count = len(sample.steps)
+    return np.stack([np.asarray(found[n], np.float64)[:count] for n in free], axis=-1)
 
 
 def _arguments(
