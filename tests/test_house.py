@@ -394,7 +394,7 @@ COUNTS = {
     "modules": (lambda: len(REBUILT), 168, 150),
     "code lines in src": (
         lambda: sum(map(code_lines, REBUILT)) - sum(CONNECTIONS.values()),
-        15_231,
+        15_244,
         11_000,
     ),
     "modules of laboratory and robot": (lambda: len(ADDED), 40, 40),

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from sainet.datasets import schema
 from sainet.engines.base import roll_out
@@ -17,6 +17,8 @@ from sainet.scenes.quantities import PROPERTIES
 from sainet.scenes.recording import CameraOffset
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, pack_motion, unpack_motion
+
+_LENGTHS = 2  # of pushes, at most, that programs are compiled for
 
 
 class PushBatch(eqx.Module):
@@ -84,6 +86,16 @@ def to_batch(
         rate_observed=jnp.asarray((cut["rate_observed"] > 0) & exists),
         simulated=jnp.asarray(cut[predicted]) if simulated else None,
     )
+
+
+def shared_lengths(steps: Int[np.ndarray, " push"]) -> Int[np.ndarray, " push"]:
+    """Return the steps that pushes are read for: two numbers, at most.
+
+    Programs are compiled for each length. What follows the end of a push is unobserved.
+    """
+    longest = int(steps.max())
+    unit = -(-longest // _LENGTHS)
+    return np.minimum(-(-steps // unit) * unit, longest)
 
 
 def to_scene(arrays: schema.Arrays, info: schema.StoreInfo) -> Scene:

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from sainet.datasets.batch import shared_lengths
 from sainet.datasets.schema import Arrays
 from sainet.datasets.store import Store
 
@@ -62,7 +63,7 @@ def _bytes(chunk: Arrays) -> int:
 
 @dataclass
 class BatchReader:
-    """Reader of batches of pushes of equal length, without loading the whole store.
+    """Reader of batches of pushes of similar length, without loading the whole store.
 
     The pushes of a batch depend only on the seed and the iteration, so that a resumed
     training run reads the same batches. `complete` adds computed arrays to the stored
@@ -79,13 +80,14 @@ class BatchReader:
     def __post_init__(self) -> None:
         """Read the lengths and start the thread that reads ahead."""
         self._cache = ChunkCache(self.store, self.names, self.memory, self.complete)
-        self._steps = self.store.read(slice(None), ("steps",))["steps"]
+        steps = self.store.read(slice(None), ("steps",))["steps"]
+        self._steps = shared_lengths(steps)
         self._order = lru_cache(maxsize=2)(self._batches_of_epoch)
         self._thread = ThreadPoolExecutor(1)
         self._ahead: dict[int, object] = {}
 
     def batch(self, iteration: int) -> tuple[Arrays, int]:
-        """Return the arrays of a batch and the number of steps of each push."""
+        """Return the arrays of a batch and the number of steps of its pushes."""
         ready = self._ahead.pop(iteration, None)
         ready = ready or self._thread.submit(self._read, iteration)
         self._ahead = {iteration + 1: self._thread.submit(self._read, iteration + 1)}
@@ -131,7 +133,7 @@ class BatchReader:
         return self._cut(np.concatenate(batches))
 
     def _cut(self, order: np.ndarray) -> list[np.ndarray]:
-        """Return whole batches of equal length; pushes of rare lengths repeat."""
+        """Return whole batches of similar length; pushes of rare lengths repeat."""
         batches = []
         for steps in np.unique(self._steps):
             same = order[self._steps[order] == steps]

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from sainet.datasets.batch import PushBatch, to_batch
+from sainet.datasets.batch import PushBatch, shared_lengths, to_batch
 from sainet.datasets.store import Store
 from sainet.identification.parameters import (
     BOUNDS,
@@ -28,7 +28,6 @@ from sainet.identification.parameters import (
 
 _LOOKS = 8  # observed poses of a push that are compared, evenly spaced
 _BATCH = 256  # pushes at a time
-_LENGTHS = 2  # at most: the engine is compiled for each
 
 
 @dataclass(frozen=True)
@@ -64,10 +63,7 @@ def samples(store: Store, own: Own = None) -> list[Sample]:
         store: of the pushes.
         own: an engine of the user's own; None: the planar engine.
     """
-    lengths = store.read(slice(None), ("steps",))["steps"]
-    longest = int(lengths.max())
-    unit = -(-longest // _LENGTHS)
-    lengths = np.minimum(-(-lengths // unit) * unit, longest)
+    lengths = shared_lengths(store.read(slice(None), ("steps",))["steps"])
     found = []
     for length in np.unique(lengths):
         same = np.flatnonzero(lengths == length)

@@ -61,7 +61,7 @@ def check_task(task: Task) -> None:
 def _check_observed(task: Task) -> None:
     """Raise `BadStore` if the first steps, on which networks train, are unknown.
 
-    Batches are of one length. Of a length that was never observed, all count nothing.
+    Pushes of a length that was never observed there would count nothing.
     """
     horizon = task.recipe.horizon
     steps = task.short_steps if horizon.short_iterations else horizon.steps
