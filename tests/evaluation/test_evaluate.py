@@ -112,6 +112,27 @@ def test_pushes_of_mixed_length_keep_the_order_of_the_store(simulated, steps, li
     assert sum(pushes for _, pushes in told) == PUSHES
 
 
+def test_pushes_of_many_lengths_share_two_programs(tmp_path):
+    """Each would take seconds to compile; what follows the end of a push is unseen."""
+    info = info_of(9)
+    arrays = made_up(info, lengths=[5, 6, 7, 8, 9, 10, 11, 12, 12])
+    store = write(tmp_path / "data", info, arrays)
+    read = []
+
+    class Noting(PhysicsDynamics):
+        def advance(self, scene, carry, controls, simulated=None):
+            read.append(controls.steps)
+            return super().advance(scene, carry, controls, simulated)
+
+    dynamics = Noting(make_engine("planar"))
+    model = Model(ModelId(kind="physics", name="engine"), dynamics)
+    found = evaluate([model], store).values("final_pos_mm", "engine")
+    assert set(read) == {6, 12}
+    for push in range(9):
+        alone = evaluate([model], store.take([push])).values("final_pos_mm", "engine")
+        np.testing.assert_allclose(found[..., push, :], alone[..., 0, :], rtol=1e-4)
+
+
 def test_groups_have_separate_means(simulated):
     found = evaluate([resting()], simulated)
     mean, _, _ = errors_at_rest(simulated, 12)

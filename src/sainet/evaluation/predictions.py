@@ -6,9 +6,9 @@ from functools import cached_property
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from sainet.datasets.batch import Prediction, PushBatch, to_batch
+from sainet.datasets.batch import Prediction, PushBatch, shared_lengths, to_batch
 from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store, last_known
 from sainet.engines.devices import over_devices
@@ -18,14 +18,15 @@ from sainet.models.model import Model
 from sainet.scenes.geometry import wrap_angle
 
 OnPushes = Callable[[str, int], None]  # called with a model and its new predictions
-# Pushes that are predicted at a time: one compilation for each length and size. Few are
-# filled up, so that datasets of about one size share what is compiled.
+# Pushes that are predicted at a time. Few are filled up, so that datasets of about one
+# size share what is compiled.
 _BATCH, _FEW = 256, 16
+Part = tuple[np.ndarray, int]  # indices of pushes of one length, and their steps
 
 
 @dataclass(frozen=True)
 class StoredPushes:
-    """Stored pushes in parts of one length: each part is compiled for once."""
+    """Stored pushes in parts of one length."""
 
     store: Store
     most: int  # steps to predict
@@ -38,11 +39,15 @@ class StoredPushes:
         published = map(published_name, info.published)
         return self.store.read(slice(None), (*names, "group", *published))
 
+    @property
+    def steps(self) -> Int[np.ndarray, " push"]:
+        """The steps of each push to predict."""
+        return np.minimum(self.arrays["steps"], self.most)
+
     @cached_property
-    def parts(self) -> list[tuple[np.ndarray, int]]:
-        """The indices of the pushes of each length, and the steps to predict."""
-        lengths = np.minimum(self.arrays["steps"], self.most)
-        return [(np.flatnonzero(lengths == n), int(n)) for n in np.unique(lengths)]
+    def parts(self) -> list[Part]:
+        """The pushes of each length."""
+        return _of_one_length(self.steps)
 
     def truths(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the true poses (m, rad) of each part, and where they are known."""
@@ -79,26 +84,32 @@ def predict_all(
     Raises:
         Diverged: a prediction is not finite.
     """
-    store, arrays = pushes.store, pushes.arrays
+    store, arrays, read = pushes.store, pushes.arrays, pushes.steps
     few = 1 if model.dynamics.on_host and not model.card else _FEW  # none compiled
-    poses: list[np.ndarray] = []
+    if not model.dynamics.on_host:  # what follows the end of a push does not change it
+        read = shared_lengths(read)
+    found = np.empty((len(read), read.max(), store.info.bodies, 3))
     stored = None
     if model.internal and (known := Prediction(model.internal, store.info)).is_stored:
         arrays = arrays | store.read(slice(None), (known.name,))
         stored = model.internal.simulator.stored_as
-    for part, steps in pushes.parts:
-        found: list[np.ndarray] = []
+    for part, steps in _of_one_length(read):
         for start in range(0, len(part), _BATCH):
             rows = part[start : start + _BATCH]
             whole = np.resize(rows, min(_BATCH, -(-len(part) // few) * few))
             some = {name: array[whole] for name, array in arrays.items()}
             batch = to_batch(some, store.info, steps=steps, simulated=stored)
             pose = _predict(model.dynamics, batch)
-            found.append(np.asarray(pose, np.float64)[: len(rows)])
+            found[rows, :steps] = np.asarray(pose)[: len(rows)]
             on_pushes(model.name, len(rows))
-        poses.append(np.concatenate(found))
-        metrics.check_finite(model.name, store.path, poses[-1], part)
+    poses = [found[part, :steps] for part, steps in pushes.parts]
+    for (part, _), each in zip(pushes.parts, poses, strict=True):
+        metrics.check_finite(model.name, store.path, each, part)
     return poses
+
+
+def _of_one_length(steps: Int[np.ndarray, " push"]) -> list[Part]:
+    return [(np.flatnonzero(steps == n), int(n)) for n in np.unique(steps)]
 
 
 def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:
