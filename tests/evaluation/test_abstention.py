@@ -139,7 +139,7 @@ class Bold(PhysicsDynamics):
             axes=np.stack([one, one], axis=-1),
             heading=one[:, 0],
             turn=one,
-            plain=np.ones((1, 2), np.float32),
+            plain=np.stack([one, one], axis=-1),
         )
 
 

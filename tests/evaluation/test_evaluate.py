@@ -233,7 +233,8 @@ def test_predictions_of_a_network_are_those_of_its_rollout(simulated):
 
 
 def test_a_prediction_that_is_not_finite_is_named(simulated):
-    with pytest.raises(Diverged, match=r"^lost: .* push 1 .*test.* not finite"):
+    named = r"^lost: .* push 0 .*simulated.* not finite, nor are 10 more of 11"
+    with pytest.raises(Diverged, match=named):
         evaluate([resting("lost", np.nan)], simulated)
 
 

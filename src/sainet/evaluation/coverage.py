@@ -7,18 +7,15 @@ radius of the circle of its area, and distances are scaled likewise. A region of
 size for all pushes, calibrated on the same pushes, stands beside them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from sainet.datasets.batch import PushBatch
-from sainet.datasets.store import last_known
 from sainet.evaluation.intervals import Estimate, Sample, estimate, folds_of
 from sainet.evaluation.measurements import Condition, Measurements
 from sainet.models.correctors import CONFIDENCE, Region, interval_score
-from sainet.models.dynamics import AbstractDynamics
 from sainet.scenes.geometry import wrap_angle
 
 KINDS = ("pos", "rot")
@@ -40,31 +37,6 @@ class Coverage(msgspec.Struct, frozen=True, kw_only=True):
     size: Estimate  # mean half width, mm or degrees
     score: Estimate  # mean interval score, halved, mm or degrees
     over_plain: Estimate  # score over that of regions of one size
-
-
-def of_parts(
-    dynamics: AbstractDynamics,
-    batches: Iterable[PushBatch],
-    poses: Iterable[np.ndarray],
-    truths: Iterable[tuple[np.ndarray, np.ndarray]],
-) -> dict[str, list[np.ndarray]]:
-    """Return the measurements of each part of some pushes; none without regions.
-
-    Args:
-        dynamics: the model.
-        batches: of the pushes of each part.
-        poses: that it predicts for them, [push, time, body, 3] (m, m, rad).
-        truths: true poses, and where they were observed.
-    """
-    found: dict[str, list[np.ndarray]] = {}
-    for batch, pose, (true, seen) in zip(batches, poses, truths, strict=True):
-        region = dynamics.region(batch.scene, batch.initial, batch.controls)
-        if region is None:
-            return {}
-        ends = last_known(pose, seen), last_known(true, seen)
-        for name, values in measured(region, *ends).items():
-            found.setdefault(name, []).append(values)
-    return found
 
 
 def measured(

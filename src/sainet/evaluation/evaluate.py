@@ -5,12 +5,16 @@ from functools import partial
 
 import numpy as np
 
-from sainet.datasets.batch import to_batch
 from sainet.datasets.schema import published_name
-from sainet.datasets.store import Store
+from sainet.datasets.store import Store, last_known
 from sainet.evaluation import coverage, measurements, metrics
 from sainet.evaluation.parts import Parts
-from sainet.evaluation.predictions import OnPushes, StoredPushes, predict_all
+from sainet.evaluation.predictions import (
+    OnPushes,
+    StoredPushes,
+    predict_all,
+    regions_of,
+)
 from sainet.models.card import Card
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
@@ -76,7 +80,7 @@ def steps_to_predict(store: Store, steps: int | None) -> int:
 
 
 def _errors(model: Model, pushes: StoredPushes, on_pushes: OnPushes) -> metrics.Errors:
-    store, longest = pushes.store, max(steps for _, steps in pushes.parts)
+    store, longest = pushes.store, pushes.exists.shape[1]
     given = model.dynamics.recall(store.push_hashes, longest, store.info.bodies)
     if given is None:
         poses = predict_all(model, pushes, on_pushes)
@@ -84,20 +88,18 @@ def _errors(model: Model, pushes: StoredPushes, on_pushes: OnPushes) -> metrics.
     on_pushes(model.name, len(given))
     if given.ndim == pushes.final.ndim:
         return metrics.final_errors(given, pushes.final)
-    return pushes.errors([given[part, :steps] for part, steps in pushes.parts])
+    return pushes.errors(given)
 
 
-def _coverage(
-    model: Model, pushes: StoredPushes, poses: Sequence[np.ndarray]
-) -> metrics.Errors:
+def _coverage(model: Model, pushes: StoredPushes, poses: np.ndarray) -> metrics.Errors:
     """Return the measurements of the regions in which the model expects the ends."""
-    arrays, info = pushes.arrays, pushes.store.info
-    batches = (
-        to_batch({k: array[part] for k, array in arrays.items()}, info, steps=steps)
-        for part, steps in pushes.parts
-    )
-    found = coverage.of_parts(model.dynamics, batches, poses, pushes.truths())
-    return {k: pushes.in_order(values) for k, values in found.items()}
+    ends = last_known(poses, pushes.observed)
+    found: metrics.Errors = {}
+    for rows, region in regions_of(model.dynamics, pushes):
+        measured = coverage.measured(region, ends[rows], pushes.final[rows])
+        for name, values in measured.items():
+            found.setdefault(name, np.empty(ends.shape[:2]))[rows] = values
+    return found
 
 
 def _measurements(

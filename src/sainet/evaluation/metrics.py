@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from sainet.datasets.store import last_known
 from sainet.evaluation.intervals import Folds, Interval, Sample
@@ -165,17 +165,14 @@ def travel_mm(
 
 
 def check_finite(
-    model: str,
-    path: Path,
-    poses: Float[np.ndarray, "push time body 3"],
-    rows: Int[np.ndarray, " push"],
+    model: str, path: Path, poses: Float[np.ndarray, "push time body 3"]
 ) -> None:
     """Raise `Diverged` if a pose is not finite: no mean of the model would be known."""
-    lost = rows[~np.isfinite(poses).all(axis=(1, 2, 3))]
+    lost = np.flatnonzero(~np.isfinite(poses).all(axis=(1, 2, 3)))
     if len(lost):
         raise Diverged(
             f"{model}: its prediction of push {lost[0]} of {path} is not finite, nor "
-            f"are {len(lost) - 1} more of {len(rows)}; leave the model out, or train "
+            f"are {len(lost) - 1} more of {len(poses)}; leave the model out, or train "
             "it again."
         )
 

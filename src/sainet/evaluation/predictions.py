@@ -1,18 +1,20 @@
 """Predictions of stored pushes by a model, and their signed errors."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from sainet.datasets.batch import Prediction, PushBatch, shared_lengths, to_batch
 from sainet.datasets.schema import input_names, published_name
 from sainet.datasets.store import Store, last_known
 from sainet.engines.devices import over_devices
 from sainet.evaluation import metrics
+from sainet.models.correctors import Region
 from sainet.models.dynamics import AbstractDynamics, stored_prediction
 from sainet.models.model import Model
 from sainet.scenes.geometry import wrap_angle
@@ -21,12 +23,11 @@ OnPushes = Callable[[str, int], None]  # called with a model and its new predict
 # Pushes that are predicted at a time. Few are filled up, so that datasets of about one
 # size share what is compiled.
 _BATCH, _FEW = 256, 16
-Part = tuple[np.ndarray, int]  # indices of pushes of one length, and their steps
 
 
 @dataclass(frozen=True)
 class StoredPushes:
-    """Stored pushes in parts of one length."""
+    """Stored pushes that models predict, up to a number of steps."""
 
     store: Store
     most: int  # steps to predict
@@ -39,47 +40,67 @@ class StoredPushes:
         published = map(published_name, info.published)
         return self.store.read(slice(None), (*names, "group", *published))
 
-    @property
+    @cached_property
     def steps(self) -> Int[np.ndarray, " push"]:
         """The steps of each push to predict."""
         return np.minimum(self.arrays["steps"], self.most)
 
     @cached_property
-    def parts(self) -> list[Part]:
-        """The pushes of each length."""
-        return _of_one_length(self.steps)
+    def exists(self) -> Bool[np.ndarray, "push time"]:
+        """Whether a push has a step, up to the longest push."""
+        return np.arange(self.steps.max())[None] < self.steps[:, None]
 
-    def truths(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return the true poses (m, rad) of each part, and where they are known."""
-        pose, observed = self.arrays["truth"], self.arrays["pose_observed"]
-        return [
-            (pose[part, :steps, :, :3].astype(np.float64), observed[part, :steps] > 0)
-            for part, steps in self.parts
-        ]
+    @cached_property
+    def truth(self) -> Float[np.ndarray, "push time body 3"]:
+        """The true poses (m, rad)."""
+        longest = self.exists.shape[1]
+        return self.arrays["truth"][:, :longest, :, :3].astype(np.float64)
 
-    def in_order(self, values: Sequence[np.ndarray]) -> np.ndarray:
-        """Return values of all parts in the order of the store."""
-        order = np.argsort(np.concatenate([part for part, _ in self.parts]))
-        return np.concatenate(values)[order]
+    @cached_property
+    def observed(self) -> Bool[np.ndarray, "push time"]:
+        """Where the true poses are known."""
+        known = self.arrays["pose_observed"][:, : self.exists.shape[1]] > 0
+        return known & self.exists
 
     @cached_property
     def final(self) -> Float[np.ndarray, "push body 3"]:
         """The last observed pose of each push."""
-        return self.in_order([last_known(*truth) for truth in self.truths()])
+        return last_known(self.truth, self.observed)
 
-    def errors(self, poses: Sequence[np.ndarray]) -> metrics.Errors:
-        """Return the errors of the predicted poses of each part."""
-        pairs = zip(poses, self.truths(), strict=True)
-        found = [metrics.push_errors(predicted, *truth) for predicted, truth in pairs]
-        return {
-            name: self.in_order([e[name] for e in found]) for name in metrics.MEASURED
-        }
+    def errors(self, poses: Float[np.ndarray, "push time body 3"]) -> metrics.Errors:
+        """Return the errors of predicted poses."""
+        return metrics.push_errors(poses, self.truth, self.observed)
+
+    def batches(
+        self,
+        steps: Int[np.ndarray, " push"],
+        arrays: Mapping[str, np.ndarray] | None = None,
+        few: int = _FEW,
+        simulated: str | None = None,
+    ) -> Iterator[tuple[np.ndarray, PushBatch]]:
+        """Yield indices of pushes that are read for equal steps, and their batch.
+
+        Args:
+            steps: that each push is read for.
+            arrays: of the pushes; None: those that every model needs.
+            few: a batch is filled up to a multiple of this, by repeats.
+            simulated: internal engine whose prediction is among the arrays.
+        """
+        arrays = arrays or self.arrays
+        for length in np.unique(steps):
+            part = np.flatnonzero(steps == length)
+            for start in range(0, len(part), _BATCH):
+                rows = part[start : start + _BATCH]
+                whole = np.resize(rows, min(_BATCH, -(-len(part) // few) * few))
+                some = {name: array[whole] for name, array in arrays.items()}
+                info = self.store.info
+                yield rows, to_batch(some, info, steps=int(length), simulated=simulated)
 
 
 def predict_all(
     model: Model, pushes: StoredPushes, on_pushes: OnPushes
-) -> list[np.ndarray]:
-    """Return the predicted poses of each part, ``[push, time, body, 3]``.
+) -> Float[np.ndarray, "push time body 3"]:
+    """Return the predicted poses (m, rad), zero after the end of a push.
 
     Raises:
         Diverged: a prediction is not finite.
@@ -88,34 +109,42 @@ def predict_all(
     few = 1 if model.dynamics.on_host and not model.card else _FEW  # none compiled
     if not model.dynamics.on_host:  # what follows the end of a push does not change it
         read = shared_lengths(read)
-    found = np.empty((len(read), read.max(), store.info.bodies, 3))
+    found = np.zeros((*pushes.exists.shape, store.info.bodies, 3))
     stored = None
     if model.internal and (known := Prediction(model.internal, store.info)).is_stored:
         arrays = arrays | store.read(slice(None), (known.name,))
         stored = model.internal.simulator.stored_as
-    for part, steps in _of_one_length(read):
-        for start in range(0, len(part), _BATCH):
-            rows = part[start : start + _BATCH]
-            whole = np.resize(rows, min(_BATCH, -(-len(part) // few) * few))
-            some = {name: array[whole] for name, array in arrays.items()}
-            batch = to_batch(some, store.info, steps=steps, simulated=stored)
-            pose = _predict(model.dynamics, batch)
-            found[rows, :steps] = np.asarray(pose)[: len(rows)]
-            on_pushes(model.name, len(rows))
-    poses = [found[part, :steps] for part, steps in pushes.parts]
-    for (part, _), each in zip(pushes.parts, poses, strict=True):
-        metrics.check_finite(model.name, store.path, each, part)
-    return poses
+    for rows, batch in pushes.batches(read, arrays, few, stored):
+        pose = np.asarray(_run(_predict_pose, model.dynamics, batch))
+        found[rows, : pose.shape[1]] = pose[: len(rows)]
+        on_pushes(model.name, len(rows))
+    found[~pushes.exists] = 0
+    metrics.check_finite(model.name, store.path, found)
+    return found
 
 
-def _of_one_length(steps: Int[np.ndarray, " push"]) -> list[Part]:
-    return [(np.flatnonzero(steps == n), int(n)) for n in np.unique(steps)]
+def regions_of(
+    dynamics: AbstractDynamics, pushes: StoredPushes
+) -> Iterator[tuple[np.ndarray, Region]]:
+    """Yield indices of pushes and the regions of their ends; nothing without regions.
+
+    Networks may drift after the end of a push, so pushes are read to their ends only.
+    """
+    for rows, batch in pushes.batches(pushes.steps) if dynamics.has_regions else ():
+        if region := _run(_region, dynamics, batch):
+            yield rows, Region._make(np.asarray(x)[: len(rows)] for x in region)
 
 
-def _predict(dynamics: AbstractDynamics, batch: PushBatch) -> Array:
+def _run(
+    function: Callable[..., Any], dynamics: AbstractDynamics, batch: PushBatch
+) -> Any:  # noqa: ANN401
     if dynamics.on_host:  # compiled, its results would differ in their last bits
-        return _predict_pose(dynamics, batch)
-    return over_devices(_predict_pose, dynamics, batch)
+        return function(dynamics, batch)
+    return over_devices(function, dynamics, batch)
+
+
+def _region(dynamics: AbstractDynamics, batch: PushBatch) -> Region | None:
+    return dynamics.region(batch.scene, batch.initial, batch.controls)
 
 
 def _predict_pose(
@@ -163,12 +192,9 @@ def end_offsets(model: Model, store: Store) -> EndOffsets:
         store: of pushes along paths, observed at least at their ends; NaN otherwise.
     """
     pushes = StoredPushes(store, store.info.steps)
-    arrays, truths = pushes.arrays, pushes.truths()
+    arrays = pushes.arrays
     poses = predict_all(model, pushes, lambda name, count: None)
-    predicted = [
-        last_known(p, seen) for p, (_, seen) in zip(poses, truths, strict=True)
-    ]
-    missed = (pushes.final - pushes.in_order(predicted))[:, 0]
+    missed = (pushes.final - last_known(poses, pushes.observed))[:, 0]
     last = arrays["command_position"][np.arange(len(missed)), arrays["steps"] - 1]
     stroke = (last - arrays["initial_pusher"]).astype(np.float64)
     return EndOffsets(
