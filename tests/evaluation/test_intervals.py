@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import ttest_1samp
 
 from sainet.evaluation.intervals import Folds, Sample
 from sainet.evaluation.metrics import ModelErrors
@@ -57,6 +58,22 @@ def test_differences_between_models_in_labs_are_paired():
     assert low[0] < value[0] < high[0]
     assert 0.4 < low[0] < high[0] < 0.6
     assert np.ptp(Sample(one[:, None], labs).interval[1:]) > 5
+
+
+def test_chances_over_labs_are_those_of_student_also_far_from_five_per_cent():
+    rng, places = np.random.default_rng(4), np.repeat(np.arange(5), 40)
+    labs = Folds(tuple(places.tolist()), are_labs=True)
+    none = Sample(np.zeros((200, 1)), labs)
+    ratios: dict[bool, list[float]] = {True: [], False: []}
+    for shift in np.tile(np.linspace(0, 3, 30), 8):
+        of_lab = rng.normal(shift, 1, 5)
+        wanted = ttest_1samp(of_lab, 0).pvalue
+        if 0.012 < wanted < 0.03 or 0.15 < wanted < 0.6:
+            sample = Sample((of_lab[places] + rng.normal(0, 0.01, 200))[:, None], labs)
+            ratios[wanted < 0.05].append(sample.chance(none)[0] / wanted)
+    for found in ratios.values():
+        assert len(found) > 20
+        assert 0.75 < np.median(found) < 1.25
 
 
 def test_one_lab_has_the_interval_of_its_pushes():

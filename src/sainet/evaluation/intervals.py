@@ -20,7 +20,7 @@ from functools import cached_property, lru_cache
 import msgspec
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtri, stdtrit
+from scipy.special import ndtri, stdtr, stdtrit
 
 RESAMPLES = 2000
 _SEED = 0
@@ -39,13 +39,29 @@ class Folds:
     are_labs: bool = False
 
     @property
-    def widening(self) -> float:
-        """Factor of deviations that makes intervals of labs those of Student's t."""
-        count = len(set(self.of_push))
-        if not self.are_labs or count == 1:
+    def count(self) -> int:
+        """The number of folds, or of labs."""
+        return len(set(self.of_push))
+
+    @property
+    def student(self) -> float:
+        """Half an interval of the mean of labs over that of a normal distribution."""
+        if not self.are_labs or self.count == 1:
             return 1.0
         high = _ENDS[1] / 100
-        return float(stdtrit(count - 1, high) / ndtri(high)) * (1 - 1 / count) ** -0.5
+        return float(stdtrit(self.count - 1, high) / ndtri(high))
+
+    @property
+    def widening(self) -> float:
+        """Factor of deviations that makes intervals of labs those of Student's t."""
+        factor = self.student
+        return factor if factor == 1 else factor * (1 - 1 / self.count) ** -0.5
+
+    def chance(self, p: np.ndarray) -> np.ndarray:
+        """Return p of Student's t over labs, from p of the multiplied deviations."""
+        if self.student == 1:
+            return p
+        return 2 * stdtr(self.count - 1, self.student * ndtri(p / 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +144,7 @@ class Sample:
         drawn = value + self._widening * (self.drawn() - other.drawn(1) - value)
         beyond = np.minimum((drawn >= 0).sum(axis=0), (drawn <= 0).sum(axis=0))
         p = np.minimum(2 * (beyond + 1) / (RESAMPLES + 1), 1.0)
+        p = p if self.folds is None else self.folds.chance(p)
         return np.where(np.isnan(drawn).any(axis=0), np.nan, p)
 
     def over(self, other: "Sample", *, trained_apart: bool = False) -> Interval:
