@@ -304,8 +304,11 @@ def test_whole_commands_run_to_their_end_in_a_folder_of_their_own(tmp_path):
     found = bench_commands(2, ("sainet --help", "sainet generate --help"))
     assert found.pop("runs") == 2
     assert len(found) == 2 and all(seconds > 0.01 for seconds in found.values())
-    with pytest.raises(subprocess.CalledProcessError):
-        bench_commands(1, (f"sainet report {tmp_path / 'nothing'}",))
+    failing = f"sainet report {tmp_path / 'nothing'}"
+    with pytest.raises(SainetError, match="it failed; repair") as caught:
+        bench_commands(1, (failing,))
+    assert str(caught.value).startswith(f"{failing}: ")
+    assert "\n" not in str(caught.value)
     with pytest.raises(BadInput, match="runs` is 0"):
         bench_commands(0)
 

@@ -15,6 +15,7 @@ from tyro.conf import Positional
 
 from sainet.cli.devices import use_devices
 from sainet.cli.output import Json, Output
+from sainet.runs.errors import SainetError
 
 if TYPE_CHECKING:
     from sainet.bench import Figures
@@ -42,6 +43,9 @@ def bench_commands(runs: int = 3, commands: Sequence[str] = COMMANDS) -> "Figure
     Args:
         runs: number of measurements, for the median; each in a new folder.
         commands: later ones may read the output of earlier ones.
+
+    Raises:
+        SainetError: a command failed.
     """
     from sainet.bench.timing import check_runs
 
@@ -58,7 +62,8 @@ def _seconds(command: str, folder: Path) -> float:
     _, *words = shlex.split(command)
     line = [sys.executable, "-m", "sainet", *words]
     start = time.perf_counter()
-    subprocess.run(line, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+    if subprocess.call(line, cwd=folder, stdout=subprocess.DEVNULL):
+        raise SainetError(f"{command}: it failed; repair what its message above names.")
     return time.perf_counter() - start
 
 
