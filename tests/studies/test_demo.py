@@ -12,6 +12,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 
 from report.test_report_browser import element, milliseconds, opened
 from sainet.cli.demo import Demo
+from sainet.cli.entry import run
 from sainet.cli.output import Output
 from sainet.cli.reproduce import Reproduce
 from sainet.datasets.config import GenerateConfig
@@ -19,9 +20,11 @@ from sainet.datasets.generate import generate
 from sainet.evaluation.claims import Claim, Verdict
 from sainet.evaluation.summary import Summary
 from sainet.runs.errors import BadInput, BadStore, MissingExtra, UnknownName
+from sainet.scenes.quantities import LARGEST_SEED
 from sainet.studies import STUDIES, DemoConfig, load_study
-from sainet.studies.demo import typical_push
+from sainet.studies.demo import run_demo, typical_push
 from sainet.studies.paper_tables import PUBLISHED_ROBOT_TWO_DISKS
+from sainet.studies.runner import Runner
 from sainet.studies.steps import Join
 from sainet.studies.study import Plan, Result, Ruling, Study
 from support import SOURCE
@@ -51,6 +54,28 @@ def test_the_demo_compares_four_models_on_both_disks(demo):
     assert "100 pushes for 2 iterations of the paper's 10,000" in page
     assert "nearest to the median of all 6 test pushes" in page
     assert shlex.join(["sainet", "demo", *TINY, "--out", str(out)]) in page
+
+
+def test_the_largest_seed_has_test_pushes_of_another_seed(monkeypatch, tmp_path):
+    seeds = []
+
+    def result(runner, step):
+        seeds.append(step.config.seed)
+        if len(seeds) == 2:
+            raise StopIteration
+
+    monkeypatch.setattr(Runner, "result", result)
+    runner = Runner(tmp_path)
+    with pytest.raises(StopIteration):
+        run_demo(DemoConfig(seed=LARGEST_SEED), tmp_path / "out", runner, print, "")
+    assert seeds == [LARGEST_SEED, 0]
+
+
+def test_a_demo_that_is_impossible_leaves_nothing(tmp_path, capsys):
+    out = tmp_path / "demo"
+    assert run(["demo", "--pushes", "0", "--out", str(out)]) == BadInput.exit_status
+    assert "--pushes is 0" in capsys.readouterr().err
+    assert not out.exists()
 
 
 def test_the_page_of_the_demo_quotes_the_command_that_was_given(monkeypatch, tmp_path):

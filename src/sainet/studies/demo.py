@@ -24,6 +24,7 @@ from sainet.report.replays import build_replay, error_curves
 from sainet.runs.documents import read_json, write_document
 from sainet.runs.folders import open_run
 from sainet.runs.manifest import MANIFEST
+from sainet.scenes.quantities import LARGEST_SEED
 from sainet.studies import DemoConfig
 from sainet.studies.paper_setup import IN, SAIN, physics
 from sainet.studies.runner import Runner
@@ -72,8 +73,8 @@ def run_demo(
         command: that runs the demo with these settings, for the report.
     """
     settings = {"command": "demo", **asdict(config)}
-    folder = open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
     compared = _comparison(config)
+    folder = open_run(out, settings, finished_by=REPORT, devices=jax.device_count())
     say("1 Simulating pushes, and the predictions of an engine with wrong properties.")
     *_, network = compared.models
     assert isinstance(network, Train)
@@ -120,7 +121,8 @@ def push_to_goal(
 def _comparison(config: DemoConfig) -> Evaluate:
     """Return the comparison of physics with both networks, on test pushes."""
     train = GenerateConfig(pushes=config.pushes, seed=config.seed)
-    test = GenerateConfig(pushes=config.test_pushes, seed=config.seed + 1)
+    other = (config.seed + 1) % (LARGEST_SEED + 1)
+    test = GenerateConfig(pushes=config.test_pushes, seed=other)
     quarter = max(config.iterations // 4, 1)
     recipe = PAPER.changed(
         iterations=config.iterations,
