@@ -73,6 +73,49 @@ def test_an_interruption_quietly_ends_all_jobs(jobs, whole_group, tmp_path):
     assert len(list(tmp_path.glob("kept-[0-9]"))) == under_way
 
 
+# Workers import this module again before they can handle a signal.
+SLOW_IMPORT = """
+import pathlib, signal, sys, time
+from sainet.runs.workers import each_done, worker_pool
+
+if __name__ == "__mp_main__":
+    (pathlib.Path(sys.argv[1]) / "imports").touch()
+    time.sleep(2)
+
+def work(index):
+    pathlib.Path(sys.argv[1], "began").touch()
+    return index
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with worker_pool(2) as pool:
+            list(each_done(pool, work, [(1,), (2,)]))
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+def test_an_interruption_while_workers_import_is_quiet_and_not_lost(tmp_path):
+    script = tmp_path / "slow.py"
+    script.write_text(SLOW_IMPORT)
+    child = subprocess.Popen(
+        [sys.executable, str(script), str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    wait_for(tmp_path, "imports", 1)
+    os.killpg(child.pid, signal.SIGINT)
+    try:
+        said, complaints = child.communicate(timeout=30)
+    finally:
+        child.kill()
+    assert (said, complaints, child.returncode) == ("interrupted\n", "", 0)
+    assert not (tmp_path / "began").exists()
+
+
 def test_a_killed_worker_is_reported_with_a_remedy():
     with (
         pytest.raises(SainetError, match="memory ran out.*fewer workers") as told,

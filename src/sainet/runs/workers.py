@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import cycle, islice
 from multiprocessing.queues import SimpleQueue
+from multiprocessing.resource_tracker import ensure_running
 from typing import Any, final
 
 from sainet.runs.errors import BadSetting, SainetError
@@ -24,9 +25,7 @@ _FAILURE = getattr(signal, "SIGUSR1", signal.SIGINT)
 
 def core_count() -> int:
     """Return the number of cores available to this process."""
-    if hasattr(os, "sched_getaffinity"):  # on Linux
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(_cores()) or os.cpu_count() or 1
 
 
 @contextmanager
@@ -83,8 +82,8 @@ def spawned_pool(workers: int, *, core_each: bool = False) -> "InterruptibleExec
 
 
 def _cores() -> list[int]:
-    """Return the cores that processes can be bound to; empty without support."""
-    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_setaffinity") else []
+    """Return the cores that processes can be bound to; empty except on Linux."""
+    return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
 
 
 @final
@@ -109,7 +108,12 @@ class InterruptibleExecutor(Executor):
         **named: Any,  # noqa: ANN401
     ) -> Future[Any]:
         """Return the future of a job."""
-        return self._pool.submit(_do, work, *arguments, **named)
+        ensure_running()  # multiprocessing's tracker unblocks SIGINT when it starts
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:  # a process that starts here inherits the block, until it is ready
+            return self._pool.submit(_do, work, *arguments, **named)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes."""
@@ -142,6 +146,7 @@ def _begin_worker(cores: "SimpleQueue[int]", begun: "SimpleQueue[int]") -> None:
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _interrupt)
     signal.signal(_FAILURE, _interrupt)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     begun.put(os.getpid())
 
 
