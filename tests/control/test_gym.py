@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 
 import gymnasium
@@ -177,6 +178,27 @@ def test_bad_options_of_reset_are_named_and_lose_nothing(options, says):
     assert_same(env.step(AHEAD)[0], other.step(AHEAD)[0])
 
 
+# In another process: here, a check of types would be first.
+NO_OPTIONS = f"""
+import gymnasium, numpy, sainet
+env = gymnasium.make({PUSH_DISKS!r}, disable_env_checker=True)
+for options in (5, 0, True, "goal", ["goal"], numpy.array([0.1, 0.2]), {{5: 1}}):
+    try:
+        env.reset(seed=0, options=options)
+    except sainet.runs.errors.BadSetting as error:
+        print(error)
+"""
+
+
+def test_options_that_are_no_dict_are_refused():
+    line = [sys.executable, "-W", "error", "-c", NO_OPTIONS]
+    found = subprocess.run(line, capture_output=True, text=True, check=True).stdout
+    *wrong, unknown = found.splitlines()
+    assert wrong[0] == "`options` is 5; it must be None, or a dict of goal and trial."
+    assert [line.split("; ")[-1] for line in wrong] == [wrong[0].split("; ")[1]] * 6
+    assert unknown == "`options` is 5; it must be one of goal, trial."
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -297,6 +319,22 @@ def test_a_picture_has_the_disks_where_they_are(disks):
         found = running.view.centre + pixel * middle
         np.testing.assert_allclose(found, centres[disk], atol=0.06 * radius[disk])
     assert make().unwrapped.render() is None
+
+
+@pytest.mark.parametrize("unknown", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("name", ["position", "angle", "pusher_position"])
+def test_a_picture_leaves_out_unknown_poses(name, unknown, monkeypatch):
+    env = make(render_mode="rgb_array").unwrapped
+    env.reset(seed=0)
+    robot = env._running.trial.robot
+    known = getattr(robot.truth, name)
+    truth = replace(robot.truth, **{name: known.at[0].set(unknown)})
+    before = env.render()
+    monkeypatch.setattr(type(robot), "truth", truth)
+    picture = env.render()
+    assert not (picture == before).all()
+    moved = [int(raster.MOVED[i : i + 2], 16) for i in (1, 3, 5)]
+    assert (picture == moved).all(axis=-1).sum() > 1000
 
 
 def test_pictures_have_the_colours_of_reports():

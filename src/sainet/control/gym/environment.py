@@ -6,7 +6,6 @@ from typing import Any, cast
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from sainet.control.gym.actions import ACTIONS, Action
 from sainet.control.gym.config import PushDisksConfig
@@ -22,7 +21,7 @@ from sainet.control.gym.spaces import (
 )
 from sainet.control.gym.task import Observation, PushDisksTask
 from sainet.control.trial import make_trial
-from sainet.runs.errors import require_one_of
+from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import require_count, require_seed
 from sainet.scenes.state import poses_of
 
@@ -85,12 +84,14 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
         Raises:
             BadInput: seed or option cannot be used, or the goal is off the table.
         """
-        options = options or {}
+        options = {} if options is None else options
+        is_mapping = isinstance(options, Mapping)  # pyright: ignore
+        require(is_mapping, "options", "None, or a dict of goal and trial", options)
         for name in options:
-            require_one_of("options", name, ("goal", "trial"))
+            require_one_of("options", str(name), ("goal", "trial"))
         goal = goal_on_table(options["goal"]) if "goal" in options else None
-        wanted = options.get("trial")
-        index = None if wanted is None else _trial(wanted)
+        if (index := options.get("trial")) is not None:
+            require_count("trial", index, low=0)
         if seed is not None:
             require_seed(seed)
             seed = int(seed)
@@ -99,9 +100,13 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
             self._seed, self._next = seed, 0
         elif self._seed is None:
             self._seed = int(self.np_random.integers(2**31))
-        self._begin(self._next if index is None else index, goal)
-        running = self._current()
-        return running.observation, running.info()
+        chosen = self._next if index is None else int(cast("int", index))
+        trial = make_trial(self.config.control(self._seed or 0), chosen)
+        if goal is not None:
+            task = eqx.tree_at(lambda t: t.goal, trial.task, jnp.asarray(goal))
+            trial = trial._replace(task=task)
+        self._running, self._next = RunningTrial.begin(trial), chosen + 1
+        return self._running.observation, self._running.info()
 
     def step(
         self, action: object
@@ -141,25 +146,7 @@ class PushDisks(GoalRewards, gymnasium.Env[Observation, Action]):
             return None
         return self._current().picture(self.task.tolerance)
 
-    def _begin(self, index: int, goal: Float[np.ndarray, "2"] | None) -> None:
-        """Begin a trial of the seed, with its own goal or another one."""
-        trial = make_trial(self.config.control(self._seed or 0), index)
-        if goal is not None:
-            task = eqx.tree_at(lambda t: t.goal, trial.task, jnp.asarray(goal))
-            trial = trial._replace(task=task)
-        self._running, self._next = RunningTrial.begin(trial), index + 1
-
     def _current(self) -> RunningTrial:
         if self._running is None:
             raise gymnasium.error.ResetNeeded("Call `reset` before this.")
         return self._running
-
-
-def _trial(index: object) -> int:
-    """Return the index of a trial.
-
-    Raises:
-        BadSetting: it is no whole number from 0.
-    """
-    require_count("trial", index, low=0)
-    return int(cast("int", index))

@@ -69,7 +69,7 @@ class Canvas:
 
     def _cover(self, outside: np.ndarray, color: str) -> None:
         """Colour the pixels at negative distances (m), smoothly over one pixel."""
-        share = np.clip(0.5 - outside / self._pixel, 0, 1)[..., None]
+        share = np.nan_to_num(np.clip(0.5 - outside / self._pixel, 0, 1))[..., None]
         self._picture += share * (_rgb(color) - self._picture)
 
 
@@ -81,8 +81,9 @@ class Goal(NamedTuple):
     tolerance: float  # distance that counts as reached, m
 
 
+@np.errstate(invalid="ignore")
 def draw(view: View, scene: Scene, state: State, goal: Goal) -> Picture:
-    """Return a picture of the disks, the pusher and the goal.
+    """Return a picture of the disks, the pusher and the goal, without unknown poses.
 
     Args:
         view: what the picture shows.
