@@ -20,11 +20,14 @@ from sainet.control.collect import DATASET, SUMMARY, collect, push_file, summary
 from sainet.control.collected import read_push, write_push
 from sainet.control.config import CollectConfig
 from sainet.datasets.store import open_store
+from sainet.engines.simulator import PAPER_RADIUS
 from sainet.robots import make_robot
+from sainet.robots.lab.hidden import draw_lab
 from sainet.robots.simulated import SimulatedRobot
 from sainet.runs.errors import BadInput, BadSetting, RunConflict, SainetError
 from sainet.scenes.pushes import Push
 from sainet.scenes.state import at_rest
+from sainet.worlds.sampling import scattered
 from support import require
 
 CONFIG = CollectConfig(pushes=8, seed=5)
@@ -241,6 +244,8 @@ def test_a_push_of_another_index_is_refused(done, tmp_path):
         ({"robot": "lab", "disks": 3}, "`disks` is 3"),
         ({"robot": "lba"}, "did you mean lab"),
         ({"swapped": True}, "`swapped` is True"),
+        ({"area_mm": 112.0}, "`area_mm` is 112; it must be from 113 to 10000 mm"),
+        ({"disks": 4}, "`area_mm` is 300; it must be from 339 to 10000 mm"),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, says):
@@ -248,9 +253,26 @@ def test_settings_out_of_range_are_refused(settings, says):
         CollectConfig(**settings)
 
 
-def test_a_work_area_without_room_is_refused(tmp_path):
-    with pytest.raises(BadInput, match="`area_mm` is 50.*larger"):
-        collect(replace(CONFIG, area_mm=50.0), tmp_path / "out")
+@pytest.mark.parametrize("command", ["record", "control"])
+def test_a_work_area_without_room_is_refused(command, tmp_path, capsys):
+    out = tmp_path / "out"
+    line = f"{command} --robot lab --area-mm 100 --out {out}"
+    assert run(line.split()) == BadInput.exit_status
+    assert (
+        "--area-mm is 100; it must be from 111 to 10000 mm" in capsys.readouterr().err
+    )
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_a_work_area_has_room_from_its_least_size_on(swapped):
+    for lab in range(100):
+        config = CollectConfig(robot="lab", lab=lab, swapped=swapped)
+        apart = sum(disk.radius for disk in draw_lab(lab, config.surface).disks)
+        assert 1000 * apart < 111
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        scattered(rng, np.array(PAPER_RADIUS), 0.111)
 
 
 def test_a_session_in_a_virtual_lab_resumes_to_the_same_bytes(tmp_path):

@@ -26,15 +26,15 @@ class Record:
         use_cache()
         from sainet.control.collect import DATASET, collect, rehearse, summary_of
 
-        bar = progress_bar("Pushing", self.config.pushes, self.output)
-        if self.config.dry_run:
-            with bar as advance:
-                rehearse(self.config, on_pushes=lambda pushes: advance(pushes, ""))
-            return {"dry_run": True, "pushes": self.config.pushes}
-        with bar as advance:
-            store = collect(
-                self.config, self.out, on_pushes=lambda pushes: advance(pushes, "")
-            )
+        with progress_bar("Pushing", self.config.pushes, self.output) as advance:
+
+            def on_pushes(pushes: int) -> None:
+                advance(pushes, "")
+
+            if self.config.dry_run:
+                rehearse(self.config, on_pushes=on_pushes)
+                return {"dry_run": True, "pushes": self.config.pushes}
+            store = collect(self.config, self.out, on_pushes=on_pushes)
         found = summary_of(self.out)
         for reason, count in found.troubles.items():
             self.output.warn(f"{count} pushes are not in the dataset: {reason}.")

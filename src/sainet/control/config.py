@@ -5,26 +5,21 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from sainet.planning import PLANNERS
-from sainet.robots import RobotConfig
+from sainet.robots import AREA, RobotConfig
 from sainet.runs.errors import require, require_one_of
 from sainet.scenes.quantities import (
     ALIGNMENT,
-    LARGEST_SEED,
     MOST_PUSHES,
+    Quantity,
     require_count,
     require_seed,
 )
 from sainet.tasks import Goals
 
 GivenProperties = Literal["true", "assumed"]
-_COUNTS = {
-    "trials": (1, 1_000_000),
-    "pushes": (1, 1_000_000),
-    "seed": (0, LARGEST_SEED),
-}
 _LEAST_ROW = 2  # disks
 _LEAST_TOLERANCE = 1e-6  # of a radius
-_MOST_WRONG = 0.5  # fraction of masses and radii
+_WRONG = Quantity("error", "", 0.0, 0.5)  # fraction of masses and radii
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,8 +82,9 @@ class ControlConfig(RobotConfig):
         is_name = isinstance(self.model, str)  # pyright: ignore
         wanted = "a name or a folder; `run_trials` takes a model of your own"
         require(is_name, "model", wanted, self.model)
-        for name, (low, high) in _COUNTS.items():
-            require_count(name, getattr(self, name), low=low, high=high)
+        for name in ("trials", "pushes"):
+            require_count(name, getattr(self, name), high=1_000_000)
+        require_seed(self.seed)
         require_one_of("goals", self.goals, get_args(Goals))
         most = self.disks - _LEAST_ROW
         require_count("obstacles", self.obstacles, low=0)
@@ -103,9 +99,7 @@ class ControlConfig(RobotConfig):
             require_count("new_surface_after", after)
             wanted = "left out if `robot` is abb; exchange its surface by hand"
             require(not self.is_physical, "new_surface_after", wanted, after)
-        wrong = self.property_error
-        wanted = f"from 0 to {_MOST_WRONG:g}"
-        require(0 <= wrong <= _MOST_WRONG, "property_error", wanted, wrong)
+        _WRONG.require("property_error", self.property_error)
         wanted = f"at least {_LEAST_TOLERANCE:g}, below 1"
         good = _LEAST_TOLERANCE <= self.tolerance < 1
         require(good, "tolerance", wanted, self.tolerance)
@@ -133,16 +127,15 @@ class ControlConfig(RobotConfig):
     def check_used(self) -> None:
         """Raise `BadSetting` for a setting that differs and has no effect."""
         super().check_used()
-        is_anywhere = not self.starts_in_a_row
-        self._check_used("area_mm", is_anywhere, "`robot` is lab or abb")
+        self._check_used("area_mm", not self.starts_in_a_row, "`robot` is lab or abb")
         after = self.new_surface_after
         is_reached = after is None or after < self.pushes
         self._check_used("new_surface_after", is_reached, "it is below `pushes`")
-        is_second = self.target == 1
-        self._check_used("alignment", is_second, "the target disk is disk 2")
+        self._check_used("alignment", self.target == 1, "the target disk is disk 2")
 
 
-_GAP_MM = (0.01, 100.0)
+_GAP = Quantity("gap", "mm", 0.01, 100.0)
+_APART_MM = 113.0  # centres of touching simulated disks
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,9 +164,10 @@ class CollectConfig(RobotConfig):
         for name in ("pushes", "repeats"):
             require_count(name, getattr(self, name), high=MOST_PUSHES)
         require_seed(self.seed)
-        low, high = _GAP_MM
-        good = low <= self.gap_mm <= high
-        require(good, "gap_mm", f"from {low:g} to {high:g}", self.gap_mm)
+        _GAP.require("gap_mm", self.gap_mm)
+        if self.robot == "simulated":
+            row = _APART_MM * (self.disks - 1)
+            replace(AREA, low=row).require("area_mm", self.area_mm)
         if self.planner is not None:
             require_one_of("planner", self.planner, PLANNERS)
         require_one_of("goals", self.goals, get_args(Goals))

@@ -1,13 +1,13 @@
 """Robots, which observe disks and execute pushes, and their settings; free of JAX."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from sainet.runs.errors import require, require_one_of
 from sainet.runs.names import load_named
-from sainet.scenes.quantities import MOST_DISKS, require_count
+from sainet.scenes.quantities import MOST_DISKS, Quantity, require_count
 from sainet.worlds.noise import NoiseLevel
 
 if TYPE_CHECKING:
@@ -22,7 +22,8 @@ Surface = Literal["abs", "plywood"]
 SURFACES: tuple[Surface, ...] = get_args(Surface)
 _MOST_LABS = 1_000_000
 _PHYSICAL = "abb"
-_AREA_MM = (1.0, 10_000.0)
+AREA = Quantity("area", "mm", 1.0, 10_000.0)
+_LAB_AREA = replace(AREA, low=111.0)  # the distance of its touching disks
 # Settings that other robots do not have.
 _OF_ROBOTS = {
     "world": "simulated",
@@ -54,7 +55,7 @@ class RobotConfig:
     """Exchange the two disks of the virtual lab, so that the larger one is pushed."""
     area_mm: float = 300.0
     """Side of the square around the table's origin in which the centres of the disks
-    are arranged (mm; lab and abb)."""
+    are arranged (mm), at least as long as their row; for control, of lab and abb."""
     config: Path | None = None
     """Configuration of the cell of the physical robot (TOML). Default: none."""
     # Not part of any run: nothing is recorded.
@@ -72,9 +73,8 @@ class RobotConfig:
         require_count("lab", self.lab, low=0, high=_MOST_LABS)
         two = self.robot == "simulated" or self.disks == 2  # noqa: PLR2004
         require(two, "disks", "2 unless `robot` is simulated", self.disks)
-        low, high = _AREA_MM
-        wanted = f"from {low:g} to {high:g}"
-        require(low <= self.area_mm <= high, "area_mm", wanted, self.area_mm)
+        area = _LAB_AREA if self.robot == "lab" else AREA
+        area.require("area_mm", self.area_mm)
         known = self.is_physical == (self.config is not None)
         wanted = f"the file of a cell if `robot` is {_PHYSICAL}, and left out otherwise"
         require(known, "config", wanted, self.config)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, BadSetting
 from sainet.scenes.pushes import Push, place_pusher
 from sainet.scenes.scene import Scene, pusher_gaps
 from sainet.scenes.state import State, at_rest, in_a_row
@@ -230,7 +230,7 @@ def scattered(
         side: of the square around the table's origin that has all centres, m.
 
     Raises:
-        BadInput: the square is too small.
+        BadSetting: the square is too small.
     """
     row = np.asarray(in_a_row(radius).position)
     for _ in range(_ARRANGEMENTS):
@@ -240,7 +240,4 @@ def scattered(
         if np.abs(position).max() <= side / 2:
             behind = position[0] - 2 * radius[0] * along
             return at_rest(_single(position), _single(np.array(own)), _single(behind))
-    raise BadInput(
-        f"`area_mm` is {1000 * side:g}: the disks could not be placed inside; give a "
-        "larger area."
-    )
+    raise BadSetting("area_mm", f"{1000 * side:g}", "larger, so that the disks fit")

@@ -174,6 +174,16 @@ def test_a_dry_run_shows_every_command_and_sends_none(
     assert not out.exists()
 
 
+def test_an_area_without_room_for_the_disks_of_a_cell_is_refused(tmp_path, capsys):
+    cell, out = example(), tmp_path / "out"
+    apart = sum(disk.radius_mm for disk in cell.disks)
+    words = ["record", "--robot", "abb", "--config", str(written(tmp_path, cell))]
+    assert run([*words, "--area-mm", f"{apart - 1:g}", "--out", str(out)]) == 2
+    says = f"--area-mm is {apart - 1:.1f}; it must be at least {apart:g}."
+    assert says in capsys.readouterr().err
+    assert not out.exists()
+
+
 @pytest.mark.slow
 def test_pushes_of_a_cell_are_recorded_in_files(tmp_path, monkeypatch):
     cell, out = example(), tmp_path / "out"

@@ -16,7 +16,7 @@ from sainet.robots.wire.motion_capture import MotionCapture
 from sainet.robots.wire.tracker import AbstractTracker
 from sainet.robots.wire.transport import UdpTransport
 from sainet.robots.wire.vicon import ViconStream
-from sainet.runs.errors import BadInput, SainetError
+from sainet.runs.errors import BadInput, SainetError, require
 
 Show = Callable[[float, Float[np.ndarray, "3"]], None]  # time (s), position (m)
 
@@ -35,7 +35,8 @@ def configured_cell(config: RobotConfig) -> Cell:
     """Return the configuration of the cell of a physical robot.
 
     Raises:
-        BadInput: it cannot be used, or lists another number of disks.
+        BadInput: it cannot be used, lists another number of disks, or its disks do not
+            fit in the area.
     """
     assert config.config is not None
     cell = read_cell(config.config)
@@ -44,6 +45,8 @@ def configured_cell(config: RobotConfig) -> Cell:
             f"{config.config}: it has {len(cell.disks)} [[disks]], not {config.disks}; "
             "list every disk on the table, the pushed one first."
         )
+    apart = sum(disk.radius_mm for disk in cell.disks)  # centres of both disks
+    require(config.area_mm >= apart, "area_mm", f"at least {apart:g}", config.area_mm)
     return cell
 
 
