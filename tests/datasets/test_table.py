@@ -159,7 +159,16 @@ HOSTILE = {
         to_csv([[*r, 0] for r in rows()], [*HEADER, "z"]),
         "row 1: column z is unknown",
     ),
+    "row numbers of pandas": (
+        to_csv([[0, *r] for r in rows()], ["", *HEADER]),
+        r"row 1: column \(unnamed\) is unknown",
+    ),
+    "decimal comma": (
+        change(9, "y", '"0,2"'),
+        "row 9: y is '0,2'; it must be a finite number: write a decimal point",
+    ),
     "cut row": (to_csv(rows())[:-30], "row 203: has .* fields, not 8"),
+    "decimal commas": (change(9, "y", "0,2"), "row 9: has 9 .* has decimal commas"),
     "no number": (
         change(9, "y", "left"),
         "row 9: y is 'left'; it must be a finite number",
@@ -178,7 +187,7 @@ HOSTILE = {
     ),
     "backwards": (
         swapped(20, 22),
-        "row 22: push '1': .* comes after",
+        "row 22: push '1': .* comes after .* give each push its own name",
     ),
     "repeated": (change(22, "time", 0.036), "row 22: .* appears twice"),
     "duplicate row": (to_csv([*rows(), rows()[-1]]), "row 204: .* appears twice"),
@@ -367,6 +376,14 @@ def test_a_misnamed_column_is_reported_with_the_units_of_the_others(tmp_path: Pa
     assert "column angle (is it 'angel'?) is missing" in missing
     assert "column angel is unknown" in unknown
     assert "y is 100 (in millimetres?)" in millimetres
+
+
+def test_columns_in_other_letters_are_recognised_in_messages(tmp_path: Path):
+    head, _, body = to_csv(rows()).partition("\n")
+    with pytest.raises(BadTable) as caught:
+        import_table(*write(tmp_path, f"{head.title()}\n{body}"), tmp_path / "out")
+    for name in HEADER:
+        assert f"{name} (is it {name.title()!r}?)" in caught.value.problems[0]
 
 
 def test_a_disk_far_from_the_pusher_is_refused(tmp_path: Path):

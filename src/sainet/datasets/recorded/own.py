@@ -213,8 +213,8 @@ class _Push:
         if fall is not None:
             same = time[fall] == time[fall - 1]
             wrong = "appears twice" if same else f"comes after {time[fall - 1]:.12g}"
-            text = f"{named}: time {time[fall]:.12g} {wrong}; sort the times of each "
-            return "clock", rows[fall], text + "body in a push, or remove the row"
+            text = f"{named}: time {time[fall]:.12g} {wrong}; sort the times, remove "
+            return "clock", rows[fall], text + "the row, or give each push its own name"
         missing, added = ~np.isin(wanted, time), ~np.isin(time, wanted)
         if missing.any():
             at = int(np.argmax(missing))

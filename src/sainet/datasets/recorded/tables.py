@@ -4,6 +4,7 @@ import csv
 import io
 from array import array
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -43,7 +44,7 @@ class Columns:
         Columns that are missing, duplicated or unknown are added to the problems.
         """
         known = (*self.wanted, *self.optional)
-        unknown = [name for name in dict.fromkeys(header) if name not in known]
+        unknown = [n or "(unnamed)" for n in dict.fromkeys(header) if n not in known]
         wrong = {
             "missing": [n for n in self.wanted if n not in header],
             "there twice": [n for n in known if header.count(n) > 1],
@@ -60,8 +61,9 @@ class Columns:
 
 
 def _hint(name: str, unknown: Sequence[str]) -> str:
-    similar = get_close_matches(name, unknown, n=1, cutoff=0.5)
-    return f" (is it {similar[0][:SHOWN]!r}?)" if similar else ""
+    in_lower_case = {each.lower(): each[:SHOWN] for each in unknown}
+    similar = get_close_matches(name, in_lower_case, n=1, cutoff=0.5)
+    return f" (is it {in_lower_case[similar[0]]!r}?)" if similar else ""
 
 
 @dataclass(frozen=True)
@@ -157,8 +159,8 @@ def read_csv(path: Path, data: bytes, columns: Columns, problems: Problems) -> T
 def _separator(path: Path, header: str, problems: Problems) -> str:
     for separator, name in _SEPARATORS.items():
         if separator in header and "," not in header:
-            line = f"{path}: row 1: {name} separate the columns; use commas."
-            problems.add("separator", line)
+            line = f"{path}: row 1: {name} separate the columns; use commas"
+            problems.add("separator", f"{line}, and decimal points in numbers.")
             return separator
     return ","
 
@@ -183,8 +185,7 @@ class _Reader:
         self.header = header
         texts = (*self.columns.texts, *self.columns.optional)
         self.texts = {name: (array("q"), {}) for name in texts if name in header}
-        numbers = self.columns.numbers
-        self.numbers = {name: array("d") for name in numbers if name in header}
+        self.numbers = {n: array("d") for n in self.columns.numbers if n in header}
 
     def read_row(self, line: int, fields: list[str]) -> None:
         where = f"{self.path}: row {line}"
@@ -195,7 +196,7 @@ class _Reader:
             self.problems.add(
                 "fields",
                 f"{where}: has {len(fields)} fields, not {len(self.header)} as the "
-                "header has; it is cut or broken: repair or remove the row.",
+                "header has; it is cut, or has decimal commas: repair or remove it.",
                 of_push=is_cut,
             )
             if not is_cut:
@@ -242,16 +243,13 @@ def number(text: str, where: str, problems: Problems) -> float:
 
     Python also reads 1_000 and digits of other scripts; tables mean something else.
     """
-    try:
-        value = float(text) if text.isascii() and "_" not in text else np.nan
-    except ValueError:
-        value = np.nan
-    if np.isfinite(value):
-        return value
+    with suppress(ValueError):
+        if text.isascii() and "_" not in text and np.isfinite(value := float(text)):
+            return value
+    remedy = "write a decimal point" if "," in text else "repair or remove the row"
     problems.add(
         f"number {where.rpartition(': ')[2]}",
-        f"{where} is {text[:SHOWN]!r}; it must be a finite number: repair or remove "
-        "the row.",
+        f"{where} is {text[:SHOWN]!r}; it must be a finite number: {remedy}.",
         of_push=True,
     )
     return np.nan
