@@ -53,7 +53,8 @@ def test_unknown_names_suggest_the_nearest():
 
 
 @pytest.mark.parametrize(
-    ("word", "nearest"), [("paly", "play"), ("evalute", "evaluate"), ("xyz", None)]
+    ("word", "nearest"),
+    [("paly", "play"), ("evalute", "evaluate"), ("PLAY", "play"), ("xyz", None)],
 )
 def test_an_unknown_command_suggests_the_nearest(word, nearest, capsys):
     assert run([word, "--data", "x"]) == 2

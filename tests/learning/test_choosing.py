@@ -135,4 +135,5 @@ def test_bad_input_ends_in_one_line(folder, options, message, capsys):
 
 def test_a_folder_without_a_process_is_refused(folder, capsys):
     assert run(["propose", str(folder / "data")]) == 2
-    assert "process.json" in capsys.readouterr().err
+    says = f"{folder / 'data'}: not a Gaussian process of 'sainet tune gp'."
+    assert capsys.readouterr().err == f"sainet: {says}\n"

@@ -110,7 +110,9 @@ def read_process_card(folder: Path) -> ProcessCard:
     """Read the card of a Gaussian process.
 
     Raises:
-        BadCheckpoint: damaged, out of bounds or of another format.
+        BadCheckpoint: missing, damaged, out of bounds or of another format.
     """
     path = folder / PROCESS
+    if not path.is_file():
+        raise BadCheckpoint(f"{folder}: not a Gaussian process of 'sainet tune gp'.")
     return read_document(path, ProcessCard, error=BadCheckpoint, remedy=REMEDY)

@@ -125,8 +125,9 @@ def missing_extra(needs: str, extra: str, instead: str = "") -> MissingExtra:
 
 def hint(name: str, known: Iterable[str]) -> str:
     """Return " (did you mean ...?)" with the most similar known name, or nothing."""
-    nearest = get_close_matches(name[:_LONGEST_SHOWN], tuple(known), n=1)
-    return f" (did you mean {nearest[0]}?)" if nearest else ""
+    in_lower_case = {each.lower(): each for each in known}
+    nearest = get_close_matches(name[:_LONGEST_SHOWN].lower(), in_lower_case, n=1)
+    return f" (did you mean {in_lower_case[nearest[0]]}?)" if nearest else ""
 
 
 def shown(value: object, most: int | None = _LONGEST_SHOWN) -> str:
