@@ -30,6 +30,7 @@ for call in (
     lambda: sn.Push("left"),
     lambda: sn.PushToGoal({}),
     lambda: gymnasium.make_vec("sainet/PushDisks-v0", 2).reset(seed=1.5),
+    lambda: sn.predict("sain", None, None, None),
 ):
     try:
         call()
@@ -54,6 +55,7 @@ LINES = [
     "BadScene push: contact_angle is left; give numbers.",
     "BadScene task: goal is {}; give numbers.",
     "BadSetting `seed` is 1.5; it must be a whole number from 0 to 4294967295.",
+    "BadSetting `dynamics` is sain; it must be the field `dynamics` of a Model.",
 ]
 
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, UInt64
 from sainet.engines.base import AbstractEngine
 from sainet.models.correctors import AbstractCorrector, Purpose, Region, Start
 from sainet.models.inputs import push_frame
-from sainet.runs.errors import BadCheckpoint
+from sainet.runs.errors import BadCheckpoint, require
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, unpack_motion
@@ -264,9 +264,13 @@ def predict(
         initial: state at the start of each push.
         controls: of each push.
         simulated: stored simulator prediction, see `AbstractDynamics.advance`.
+
+    Raises:
+        BadSetting: the first argument has no dynamics, for example a name.
     """
-    is_compiled = simulated is not None or not dynamics.on_host
-    roll = _compiled if is_compiled else _roll
+    is_dynamics = isinstance(dynamics, AbstractDynamics)  # pyright: ignore
+    require(is_dynamics, "dynamics", "the field `dynamics` of a Model", dynamics)
+    roll = _roll if simulated is None and dynamics.on_host else _compiled
     return roll(dynamics, (scene, initial, controls, simulated))
 
 
