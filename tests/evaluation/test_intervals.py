@@ -117,3 +117,11 @@ def test_quantities_and_training_runs_stay_apart():
         alone = Sample(values[..., quantity : quantity + 1]).interval
         for one, other in zip(both, alone, strict=True):
             assert one[quantity] == pytest.approx(other[0])
+
+
+def test_ratio_of_errors_of_zero_in_labs_is_zero():
+    """Predictions may be exact: those of a disk that nothing touches, for example."""
+    labs = Folds((0, 0, 1, 1, 2, 2), are_labs=True)
+    errors, travel = np.zeros((6, 1)), np.ones((6, 1))
+    found = Sample(errors, labs).over(Sample(travel, labs))
+    assert [end.item() for end in found] == [0, 0, 0]

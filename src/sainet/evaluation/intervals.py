@@ -161,7 +161,7 @@ class Sample:
         drawn = np.maximum(self.drawn(), 0) / np.maximum(below, _FLOOR)
         value = self.mean / np.maximum(other.mean, _FLOOR)
         if self._widening != 1:  # of the logarithm: a ratio of labs stays positive
-            drawn = value * (drawn / value) ** self._widening
+            drawn = value * (drawn / np.maximum(value, _FLOOR)) ** self._widening
         low, high = np.percentile(drawn, _ENDS, axis=0)
         is_known = np.percentile(below, 100 - _ENDS[1], axis=0) > 0
         return value, low, np.where(is_known, high, np.nan)
