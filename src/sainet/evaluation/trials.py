@@ -154,7 +154,7 @@ def _chance(mine: np.ndarray, theirs: np.ndarray, labs: Folds | None) -> float:
     """Return p, two-sided, that trials reach as much with either model."""
     if labs:
         one, other = (Sample(x[:, None].astype(float), labs) for x in (mine, theirs))
-        return max(float(one.chance(other)[0]), _agreeing(mine, theirs, labs))
+        return _agreeing(mine, theirs, labs) or float(one.chance(other)[0])
     from scipy.stats import binomtest  # slow to import
 
     unlike = int((mine != theirs).sum())
@@ -162,7 +162,7 @@ def _chance(mine: np.ndarray, theirs: np.ndarray, labs: Folds | None) -> float:
 
 
 def _agreeing(mine: np.ndarray, theirs: np.ndarray, labs: Folds) -> float:
-    """Return the least p of labs that all favour one model; 0 if they do not.
+    """Return p of labs that all favour one model; 0 if they do not.
 
     No resample of such labs favours the other model, however few they are. So the mean
     of their differences is tested by Student's t, as if one trial less had differed.
