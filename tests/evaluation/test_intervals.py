@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
-from sainet.evaluation.intervals import Folds, Sample
+
+from scipy import stats
+
+from sainet.evaluation.intervals import Folds, Sample, wilson
 from sainet.evaluation.metrics import ModelErrors
 
 
@@ -125,3 +128,57 @@ def test_ratio_of_errors_of_zero_in_labs_is_zero():
     errors, travel = np.zeros((6, 1)), np.ones((6, 1))
     found = Sample(errors, labs).over(Sample(travel, labs))
     assert [end.item() for end in found] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("spread", [0.01, 0.05])
+def test_ratios_of_a_few_labs_have_the_t_interval_of_their_logarithms(spread):
+    logarithms = spread * stats.norm.ppf(np.linspace(0.1, 0.9, 5))
+    labs = Folds(tuple(range(5)), are_labs=True)
+    one, other = (
+        Sample(np.exp(logarithms)[:, None], labs),
+        Sample(np.ones((5, 1)), labs),
+    )
+    value, *ends = np.ravel(one.over(other))
+    half = stats.t.ppf(0.975, 4) * logarithms.std(ddof=1) / np.sqrt(5)
+    np.testing.assert_allclose(np.log(ends / value), [-half, half], rtol=0.1)
+
+
+def test_a_ratio_to_no_error_has_no_upper_end():
+    error, none = Sample(np.ones((20, 1))), Sample(np.zeros((20, 1)))
+    assert np.isnan(error.over(none)[2][0])
+
+
+def test_p_is_never_below_that_of_one_resample():
+    one, other = Sample(np.full((20, 2), [1.0, np.nan])), Sample(np.zeros((20, 2)))
+    p, unknown = one.chance(other)
+    assert p == pytest.approx(2 / 2001)
+    assert p == pytest.approx(other.chance(one)[0])
+    assert np.isnan(unknown)
+
+
+def test_shares_of_folds_and_training_runs_are_wider_than_those_of_pushes():
+    """Wilson's interval is that of independent pushes: of folds it is too narrow."""
+    alike = (np.arange(200) % 5 < 2).astype(float)[:, None]
+    folds = Folds(tuple((np.arange(200) % 5).tolist()))
+    (share,), (low,), (high,) = Sample(alike, folds).share
+    plain = Sample(alike)
+    np.testing.assert_allclose(np.ravel(plain.share), [share, *wilson(share, 200)])
+    assert high - low > 4 * np.ptp(plain.share[1:])
+    trained = Sample(np.stack([alike, np.ones_like(alike)]))
+    assert np.ptp(trained.share[1:]) > 4 * np.ptp(
+        Sample(trained.mean + 0 * alike).share[1:]
+    )
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_shares_of_none_or_all_have_wilsons_interval_unless_of_one_push(share):
+    folds = Folds(tuple((np.arange(40) % 4).tolist()))
+    found = np.ravel(Sample(np.full((40, 1), share), folds).share)
+    np.testing.assert_allclose(found, [share, *wilson(share, 40)])
+    assert np.isnan(Sample(np.full((1, 1), share)).share[1:]).all()
+
+
+def test_wilsons_interval_is_that_of_scipy():
+    for solved in (0, 3, 17, 20):
+        wanted = stats.binomtest(solved, 20).proportion_ci(method="wilson")
+        np.testing.assert_allclose(wilson(solved / 20, 20), wanted, atol=1e-12)

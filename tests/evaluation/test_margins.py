@@ -19,7 +19,7 @@ def ruled(*differences, margin=0.05, less=0.0):
             against="in",
             body=body,
             metric="pos_mm",
-            difference=Estimate((low + high) / 2, low, high),
+            difference=Estimate(low, low, high),
         )
         for body, (low, high) in enumerate(differences, start=1)
     ]
@@ -44,3 +44,7 @@ def test_a_fraction_must_be_clearly_better():
 
 def test_without_comparisons_nothing_is_ruled():
     assert ruled().status == "not testable here"
+
+
+def test_a_comparison_without_an_interval_is_not_ruled_on():
+    assert ruled((-0.3, -0.1), (-0.3, None)).status == "not testable here"

@@ -1,9 +1,16 @@
 """Verdicts: which models solve more goals, and whether errors rank as published."""
 
 import pytest
+from msgspec.structs import replace
 
 from report import samples
-from sainet.evaluation.claims import PUBLISHED_ORDER, errs_less, solves_more
+from sainet.evaluation.claims import (
+    PUBLISHED_ORDER,
+    best_network,
+    errs_less,
+    sign,
+    solves_more,
+)
 from sainet.evaluation.measurements import Condition, PublishedValues
 from sainet.evaluation.summary import Comparison, Estimate, Summary
 from sainet.evaluation.trials import TrialRow, TrialTest
@@ -143,6 +150,47 @@ def test_a_model_errs_less_if_every_interval_lies_below_zero(ends, status, rever
     assert errs_less("sain", "in")(found).status == status
     assert errs_less("in", "sain")(found).status == reverse
     assert errs_less("sain", "physics")(found).status == "not testable here"
+
+
+def test_the_least_certain_comparison_decides_that_a_model_errs_less():
+    pairs = compared_by(-2.0, -1.0).comparisons
+    values = [replace(each, p=p) for each, p in zip(pairs, (0.01, 0.04), strict=True)]
+    found = errs_less("sain", "in")(Summary(models=(), comparisons=tuple(values)))
+    assert (found.status, found.p) == ("holds", 0.04)
+
+
+def test_a_comparison_without_an_interval_leaves_a_claim_untested():
+    first, last = compared_by(-2.0, -1.0).comparisons
+    last = replace(last, difference=Estimate(-1.5))
+    found = Summary(models=(), comparisons=(first, last))
+    assert errs_less("sain", "in")(found).status == "not testable here"
+    assert sign(replace(last, difference=Estimate(-1.5, None, -1.0))) == 0
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])
+def test_an_interval_that_ends_at_zero_does_not_leave_it_out(low, high):
+    assert [sign(each) for each in compared_by(low, high).comparisons] == [0, 0]
+
+
+def best_of(**errors):
+    """Rule on models with these errors in mm; the engine as it is errs by 3.6 mm."""
+    known = {name.replace("_", "-").strip("-"): e for name, e in errors.items()}
+    factors = tuple(samples.factor(*each) for each in known.items())
+    models = tuple(map(samples.identity, known))
+    found = best_network(Summary(models=models, factors=factors), "")
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("sain", [0.5, 1.5])
+def test_the_best_network_adds_to_an_engine_where_one_does(sain):
+    found = best_of(physics=3.6, physics_true=2.0, in_=1.0, sain=sain)
+    assert found.best.model == "sain"
+    assert (found.alone.error, found.true_properties.error) == (1.0, 2.0)
+
+
+def test_true_properties_that_change_nothing_are_left_out():
+    assert best_of(physics=3.6, physics_true=3.601, sain=0.5).true_properties is None
 
 
 @pytest.mark.parametrize(("p", "status"), [(0.001, "holds"), (0.2, "does not hold")])
