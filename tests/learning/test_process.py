@@ -349,6 +349,11 @@ def test_interval_scores_are_those_of_the_definition():
     np.testing.assert_allclose(found["score_rot"], turned, rtol=1e-5)
     assert found["inside_pos"] == 0
     assert found["inside_rot"] == 0
+    # Of an end that was not observed, nothing is known.
+    unseen = measured(region, np.zeros((1, 1, 3)), np.full_like(true, np.nan))
+    assert np.isnan([unseen["inside_pos"], unseen["inside_rot"]]).all()
+    exact = measured(region, true, true)
+    assert exact["inside_pos"] == exact["inside_rot"] == 1
 
 
 @pytest.mark.parametrize("disks", [1, 3])

@@ -49,7 +49,7 @@ def measured(
     Args:
         region: about the predicted end.
         predicted: final pose (m, m, rad).
-        true: final pose that was observed.
+        true: final pose that was observed; NaN: none was, and nothing is known.
     """
     off = true - predicted
     turn = wrap_angle(off[..., 2])
@@ -67,7 +67,7 @@ def measured(
     whole = {"pos": 1000 * np.hypot(along, across), "rot": error["rot"]}
     found: dict[str, np.ndarray] = {}
     for kind in KINDS:
-        found[INSIDE.format(kind)] = (error[kind] <= width[kind]).astype(np.float64)
+        found[INSIDE.format(kind)] = np.heaviside(width[kind] - error[kind], 1.0)
         found[SIZE.format(kind)] = width[kind]
         found[SCORE.format(kind)] = interval_score(width[kind], error[kind])
         found[PLAIN.format(kind)] = interval_score(same[kind], whole[kind])
