@@ -14,6 +14,7 @@ from sainet.runs.errors import BadStore
 
 PUSHES, FOLDS = 40, 4
 EVERY = np.arange(PUSHES)
+PLACED = ("initial", "initial_pusher", "command_position")
 SAME = ("initial_pusher", "command_position", "repeat")
 
 
@@ -56,6 +57,17 @@ def test_blocks_are_ranges_of_equal_size(spread_out, scheme):
         in_order = owner[np.argsort(values[scheme])]
         assert in_order[0] != in_order[-1]
     assert (in_order != np.roll(in_order, 1)).sum() == FOLDS
+
+
+def test_folds_by_place_do_not_depend_on_where_the_origin_is(spread_out, tmp_path):
+    store, _ = spread_out
+    info, arrays, _ = spread()
+    for name in SAME[:2]:
+        arrays[name] = arrays[name] + [1.0, 3.0]
+    arrays["initial"][..., :2] += [1.0, 3.0]
+    moved = write(tmp_path / "data", info, arrays)
+    owner, found = (folds_by(s, "place", FOLDS, EVERY) for s in (store, moved))
+    assert len({*zip(owner, found, strict=True)}) == FOLDS
 
 
 @pytest.mark.parametrize("scheme", ["place", "side"])
@@ -115,14 +127,32 @@ def test_equal_values_are_not_parted(tmp_path, scheme):
     info, arrays, _ = spread()
     some, many = EVERY[:1].repeat(PUSHES // 4), EVERY[1:2].repeat(3 * PUSHES // 4)
     rows = np.concatenate([some, many])
-    same = {"initial", "initial_pusher", "command_position"}
-    two = {k: np.asarray(v)[rows] if k in same else v for k, v in arrays.items()}
+    two = {k: np.asarray(v)[rows] if k in PLACED else v for k, v in arrays.items()}
     store = write(tmp_path / "data", info, two)
     assert len({*zip(rows, folds_by(store, scheme, 2, EVERY), strict=True)}) == 2
     with pytest.raises(BadStore, match=f"2 of them different by {scheme}.*fewer folds"):
         folds_by(store, scheme, 3, EVERY)
     with pytest.raises(BadStore, match=rf"1 of them different by {scheme}.*take anoth"):
         folds_by(store, scheme, 2, EVERY[-20:])
+
+
+@pytest.mark.parametrize("scheme", ["place", "direction", "side"])
+def test_pairs_of_equal_values_fill_equal_folds(tmp_path, scheme):
+    info, arrays, _ = spread()
+    pairs = {k: np.asarray(arrays[k])[EVERY // 2] for k in (*PLACED, "repeat")}
+    store = write(tmp_path / "data", info, arrays | pairs)
+    owner = folds_by(store, scheme, FOLDS, EVERY)
+    assert np.bincount(owner).tolist() == [PUSHES // FOLDS] * FOLDS
+    assert (owner[::2] == owner[1::2]).all()
+
+
+def test_pushes_that_hardly_differ_in_place_are_refused(tmp_path):
+    info, arrays, _ = spread()
+    near = np.random.default_rng(2).uniform(-1e-4, 1e-4, (PUSHES, 2))  # m
+    arrays["initial"][:, 0, :2] = near
+    store = write(tmp_path / "data", info, arrays)
+    with pytest.raises(BadStore, match="different by place"):
+        folds_by(store, "place", FOLDS, EVERY)
 
 
 def test_a_part_has_the_kinds_of_the_whole_and_blocks_of_its_own(spread_out):

@@ -100,6 +100,10 @@ def test_a_chain_of_pushes_stays_together(tmp_path):
     train, tests = split(store, 0.3, chains=True)
     assert sorted([*train.rows, *tests.rows]) == list(range(12))
     assert list(tests.rows) in chains
+    parts = write_split(store, tmp_path / "parts", test=0.3, chains=True)
+    assert [part.info.pushes for part in parts] == [len(train.rows), len(tests.rows)]
+    for found, part in zip(parts, (train, tests), strict=True):
+        assert (found.push_hashes() == part.push_hashes()).all()
     # Repeats join the chains that they are in.
     again = write(tmp_path / "again", info, arrays | {"repeat": np.arange(12) % 11})
     numbers = linked(again)
