@@ -110,6 +110,15 @@ def test_gaps_are_neither_interpolated_nor_differentiated():
     assert rates.sum() == 240 - (SMOOTHING - 1) - gap.sum() - (SMOOTHING - 1) - 1
 
 
+def test_a_pose_without_an_angle_is_not_known():
+    time = clock(0.5)
+    recording = merged(along(time, 0.1 * time), still(time))
+    recording.pose[30:90, 0, 2] = np.nan
+    poses = resample(recording).motion[..., :3]
+    assert np.isfinite(poses[-1]).all()
+    assert np.isnan(poses[40]).all()
+
+
 def test_between_samples_at_the_longest_gap_poses_are_known_despite_rounding():
     time = np.arange(21) / 10
     assert np.isfinite(resampled(along(time, time), still(time)).motion[..., :3]).all()

@@ -12,7 +12,7 @@ import pytest
 from datasets.stores import assert_same_files
 from learning.stores import end_points_alone, info_of, made_up, write
 from sainet.cli.entry import run
-from sainet.datasets.chains import linked
+from sainet.datasets.chains import continuations, linked
 from sainet.datasets.splits import (
     fold_of_push,
     split,
@@ -109,6 +109,25 @@ def test_a_chain_of_pushes_stays_together(tmp_path):
     numbers = linked(again)
     assert numbers[0] == numbers[11]
     assert len(set(numbers)) == 2
+
+
+def test_continuations_are_those_of_a_double_loop():
+    """Of poses about as near as counts, on both sides and at all angles."""
+    rng, count = np.random.default_rng(0), 60
+    start = rng.uniform(-1, 1, (count, 2, 3)) * [0.5, 0.5, np.pi]
+    away = rng.uniform(-1, 1, (count, 2, 3)) * [2.5e-4, 2.5e-4, np.deg2rad(1.2)]
+    end = (start + away)[::-1]
+    end[3] = np.nan
+    ended, started = continuations(start, end)
+    wanted = set()
+    for one in range(count):
+        for other in range(count):
+            x, y, angle = (start[other] - end[one]).T
+            turned = np.abs(np.angle(np.exp(1j * angle)))
+            if (np.hypot(x, y) <= 3e-4).all() and (turned <= np.deg2rad(1.0)).all():
+                wanted.add((one, other))
+    assert {*zip(ended.tolist(), started.tolist(), strict=True)} == wanted
+    assert 10 < len(wanted) < 50
 
 
 def test_parts_become_datasets_like_any_other(store, tmp_path):
