@@ -110,6 +110,18 @@ def test_long_pushes_are_never_mixed_with_those_of_half_their_length(
     assert read == {12: {12}, 6: {6, 3}}
 
 
+def test_long_and_short_pushes_alternate_within_an_epoch(mixed_store, make_reader):
+    """Not all short ones first: training would end every epoch with long pushes."""
+    orders = []
+    for seed in range(6):
+        reader = make_reader(mixed_store, batch_size=4, seed=seed)
+        orders.append([reader.batch(i)[1] for i in range(9)])  # 30 // 4 + 10 // 4
+        assert sorted(orders[-1]) == [6] * 2 + [12] * 7
+    places = np.array([np.flatnonzero(np.array(each) == 6) for each in orders])
+    assert places.min() <= 1
+    assert places.max() >= 5
+
+
 def test_a_length_too_rare_for_a_batch_is_repeated(mixed_store, make_reader):
     lengths = mixed_store.read(slice(None), ("steps",))["steps"]
     reader = make_reader(mixed_store, batch_size=20)

@@ -28,6 +28,7 @@ from sainet.models.library import load_model
 from sainet.runs.digests import digests_to_text
 from sainet.runs.errors import BadCheckpoint, BadInput, BadSetting, BadStore
 from sainet.scenes.pushes import command_path
+from sainet.scenes.recording import AGREES
 from sainet.scenes.state import pack_motion
 from sainet.studies.run_report import page_of
 
@@ -95,6 +96,39 @@ def test_regions_hold_the_pushes_that_calibrated_them(folder, store):
     assert {each.kind for each in found} == {"pos", "rot"}
     assert all(each.inside.value > 90 for each in found)
     assert all(each.size.value > 0 for each in found)
+
+
+def test_what_disagreement_lacks_is_a_floor_and_nine_tenths_are_within_reach(
+    folder, store, monkeypatch
+):
+    rng = np.random.default_rng(0)
+    spread = rng.uniform(0.5, 1.5, (PUSHES, 2, 3)) * [1e-3, 1e-3, 0.02]
+    spread[:, 1, 2] = 0.5  # rad: members disagree by more than they err
+    missed = np.array([2e-3, 3e-3, 0.05]) * rng.normal(size=(PUSHES, 2, 3))
+    missed[7] = np.nan  # not observed
+    both = missed, spread
+    monkeypatch.setattr(ensemble_module, "_missed_and_spread", lambda *given: both)
+    dynamics = load_model(str(folder)).dynamics
+    found = ensemble_module._calibrate(dynamics, AGREES, store)
+    known = np.delete(missed, 7, axis=0), np.delete(spread, 7, axis=0)
+    assert found.calibrated_on == PUSHES - 1
+    for body in range(2):
+        lacking = np.mean([off[body] ** 2 for off in known[0]], axis=0)
+        least = 0.01 * lacking
+        lacking = lacking - np.mean([s[body] ** 2 for s in known[1]], axis=0)
+        lacking = np.maximum(lacking, least)
+        place, turn = np.sqrt([(lacking[0] + lacking[1]) / 2, lacking[2]])
+        assert found.floor[body] == pytest.approx((place, turn))
+        scaled, plain = [], []
+        for off, own in zip(known[0][:, body], known[1][:, body], strict=True):
+            width = np.sqrt(own**2 + np.array([place, place, turn]) ** 2)
+            x, y, angle = off / width
+            scaled.append((np.hypot(x, y), abs(angle)))
+            plain.append((np.hypot(*off[:2]), abs(off[2])))
+        nine_tenths = int(np.ceil(0.9 * PUSHES)) - 1
+        for values, limits in ((scaled, found.reach), (plain, found.plain)):
+            wanted = np.sort(values, axis=0)[nine_tenths]
+            np.testing.assert_allclose(limits[body], wanted)
 
 
 def test_regions_grow_with_disagreement(folder, batch):
