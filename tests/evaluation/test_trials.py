@@ -73,7 +73,7 @@ def test_rows_count_what_trials_reached():
     others = {
         "ended": np.array([[1, 1, 1, 0, 1, -1], [1] * 6], float),
         "pushes": np.array([[3, 25, 25, 60, 26, 60], [7] * 6], float),
-        "final_mm": np.array([[1.0, 4.0, 4.5, 30.0, 3.0, 9.0], [0.5] * 6]),
+        "final_mm": np.array([[1.0, 4.0, 4.5, 30.0, 3.0, 3.8], [0.5] * 6]),
         "decision_s": np.array([[0.1, 0.3, np.nan, 0.2, 0.4, 0.6], [np.nan] * 6]),
     }
     fold = np.full(6, -1, np.int32)
@@ -82,9 +82,9 @@ def test_rows_count_what_trials_reached():
     wanted = stats.binomtest(3, 6).proportion_ci(method="wilson")
     assert found.interval == pytest.approx(tuple(wanted))
     assert (found.median_pushes, found.median_decision_s) == (25, 0.3)
-    assert found.within_4_mm == 0.5  # the last one within 25 pushes ends 4.5 mm away
+    assert found.within_4_mm == pytest.approx(4 / 6)
     assert found.within_25_pushes == pytest.approx(2 / 6)  # of those that are solved
-    assert (found.median_final_mm, found.ended_early) == (4.25, 1)
+    assert (found.median_final_mm, found.ended_early) == (3.9, 1)
     assert (other.solved, other.median_decision_s, other.ended_early) == (6, None, 0)
 
 
