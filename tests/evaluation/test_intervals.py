@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.stats import ttest_1samp
-
-
 from scipy import stats
+from scipy.stats import ttest_1samp
 
 from sainet.evaluation.intervals import Folds, Sample, wilson
 from sainet.evaluation.metrics import ModelErrors
