@@ -371,6 +371,9 @@ def test_equal_frictions_are_exactly_the_initial_value():
     scenes = [eqx.tree_at(lambda s: s.table_friction, samples_scene(), friction)]
     one, more = (starting_values(scenes * n, ("table_friction",)) for n in (1, 3))
     assert one == more == {"table_friction": float(jnp.mean(friction))}
+    lower = eqx.tree_at(lambda s: s.table_friction, scenes[0], friction[:64] - 0.1)
+    both = starting_values([*scenes, lower], ("table_friction",))
+    assert both["table_friction"] == pytest.approx((256 * 0.15 + 64 * 0.05) / 320)
 
 
 def test_an_unknown_group_lists_the_available_groups(tmp_path):
