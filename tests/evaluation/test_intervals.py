@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy import stats
-from scipy.stats import ttest_1samp
 
 from sainet.evaluation.intervals import Folds, Sample, wilson
 from sainet.evaluation.metrics import ModelErrors
@@ -68,7 +67,7 @@ def test_chances_over_labs_are_those_of_student_also_far_from_five_per_cent():
     ratios: dict[bool, list[float]] = {True: [], False: []}
     for shift in np.tile(np.linspace(0, 3, 30), 8):
         of_lab = rng.normal(shift, 1, 5)
-        wanted = ttest_1samp(of_lab, 0).pvalue
+        wanted = stats.ttest_1samp(of_lab, 0).pvalue
         if 0.012 < wanted < 0.03 or 0.15 < wanted < 0.6:
             sample = Sample((of_lab[places] + rng.normal(0, 0.01, 200))[:, None], labs)
             ratios[wanted < 0.05].append(sample.chance(none)[0] / wanted)
