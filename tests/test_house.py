@@ -385,6 +385,7 @@ CONNECTIONS = {
     # values out of range in simulations, labels on pages.
     "what further reviews found": 134,
     "a shorter training beside the paper's recipe": 27,
+    "pushes of many lengths, predicted and judged in few programs": 14,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.
     "many machines": 245,

@@ -3,7 +3,13 @@
 import pytest
 
 from sainet.studies import load_study
-from sainet.studies.any_number import ASSUMED, CONTACTS
+from sainet.studies.any_number import (
+    ASSUMED,
+    ASSUMED_MIXED,
+    CONTACTS,
+    MIXED,
+    TrainMixture,
+)
 from sainet.studies.runner import all_steps
 from sainet.studies.steps import Evaluate, Simulate, Train
 from sainet.studies.study import Scope, last_steps
@@ -29,3 +35,19 @@ def test_networks_of_two_disks_are_tested_on_more(name, network, disks):
     assert {each.disks for each in tests} == disks
     assert pushes.config.seed not in {each.seed for each in tests}
     assert len({(each.disks, each.arrangement) for each in tests}) == len(tests)
+
+
+@pytest.mark.parametrize(
+    ("name", "network", "hold"),
+    [("any-number", MIXED, 8), ("any-number-assumed", ASSUMED_MIXED, 1)],
+)
+def test_mixed_networks_are_trained_on_one_to_four_disks(name, network, hold):
+    plan = load_study(name).plan(Scope("paper"))
+    steps = all_steps(last_steps([plan])).values()
+    trained = [each for each in steps if isinstance(each, Train) and each.id == network]
+    assert sorted(each.recipe.seed for each in trained) == [0, 1, 2, 3, 4]
+    for each in trained:
+        assert isinstance(each, TrainMixture)
+        disks = [pushes.config.disks for pushes in (each.pushes, *each.more)]
+        assert disks == [1, 2, 3, 4]
+        assert each.recipe.horizon.hold == hold

@@ -59,7 +59,7 @@ class FunctionDynamics(AbstractDynamics):
         del simulated
         whole = carry.with_more(controls)
         poses = self._poses(scene, carry.initial, whole)
-        start = np.asarray(_pose(carry.initial))[:, None]
+        start = np.asarray(carry.initial.pose)[:, None]
         rates = np.diff(poses, axis=1, prepend=start) / scene.time_step
         path, velocity = whole.pusher_motion(carry.initial.pusher_position)
         states = State(
@@ -85,10 +85,6 @@ class FunctionDynamics(AbstractDynamics):
                 f"must be {list(wanted)}: push, time, body, pose (m, m, rad)."
             )
         return poses
-
-
-def _pose(state: State) -> Any:  # noqa: ANN401
-    return jnp.concatenate([state.position, state.angle[..., None]], axis=-1)
 
 
 def from_function(function: Predict, *, name: str) -> Model:

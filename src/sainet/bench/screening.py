@@ -3,6 +3,7 @@
 from statistics import median
 from time import perf_counter
 
+import equinox as eqx
 import jax
 
 from sainet.bench import Figures
@@ -13,7 +14,6 @@ from sainet.models.dynamics import AbstractDynamics
 from sainet.models.library import load_model
 from sainet.planning.base import Plan
 from sainet.planning.tree import TreePlanner
-from sainet.scenes.pushes import Push
 
 MODELS = ("sain", "sain-any")
 DISKS = (2, 3)
@@ -60,7 +60,7 @@ def _measured(dynamics: AbstractDynamics, disks: int, runs: int) -> dict[str, fl
                 plans.append(planner.plan(dynamics, trial.task, trial.scene, state))
                 took.append(perf_counter() - start)
             times.append(took)
-            same.append(_same(*(plan.pushes[0] for plan in plans)))
+            same.append(bool(eqx.tree_equal(*(plan.pushes[0] for plan in plans))))
             trial.robot.push(plans[0].pushes[0])
     screened, unscreened = (median(each) for each in zip(*times[1:], strict=True))
     return {
@@ -68,7 +68,3 @@ def _measured(dynamics: AbstractDynamics, disks: int, runs: int) -> dict[str, fl
         "unscreened_s": unscreened,
         "same_first_push": sum(same) / len(same),
     }
-
-
-def _same(one: Push, other: Push) -> bool:
-    return jax.tree.all(jax.tree.map(lambda x, y: bool(x == y), one, other))

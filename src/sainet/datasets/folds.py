@@ -72,7 +72,9 @@ def _values(store: Store, scheme: Scheme) -> Float[np.ndarray, " push"]:
     arrays = store.read(slice(None), names)
     place = pushed_disk(arrays)[:, :2]
     if scheme == "place":
-        return place @ _longest_axis(place)
+        # Along the direction in which places are spread most.
+        axes = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)[2]
+        return place @ axes[0]
     if scheme == "order":
         return np.arange(len(place), dtype=float)
     angles = _direction(arrays) if scheme == "direction" else _side(arrays)
@@ -112,8 +114,3 @@ def _blocks(values: Float[np.ndarray, " push"], count: int) -> Int[np.ndarray, "
     _, number, sizes = np.unique(values, return_inverse=True, return_counts=True)
     middle = np.cumsum(sizes) - 1 - sizes // 2  # rank of the middle of equal values
     return middle[number] * count // len(values)
-
-
-def _longest_axis(places: Float[np.ndarray, "push 2"]) -> Float[np.ndarray, "2"]:
-    """Return the direction in which places are spread most."""
-    return np.linalg.svd(places - places.mean(axis=0), full_matrices=False)[2][0]

@@ -39,29 +39,14 @@ class Folds:
     are_labs: bool = False
 
     @property
-    def count(self) -> int:
-        """The number of folds, or of labs."""
-        return len(set(self.of_push))
-
-    @property
-    def student(self) -> float:
-        """Half an interval of the mean of labs over that of a normal distribution."""
-        if not self.are_labs or self.count == 1:
-            return 1.0
-        high = _ENDS[1] / 100
-        return float(stdtrit(self.count - 1, high) / ndtri(high))
+    def labs(self) -> int:
+        """The number of labs; 1 for folds."""
+        return len(set(self.of_push)) if self.are_labs else 1
 
     @property
     def widening(self) -> float:
         """Factor of deviations that makes intervals of labs those of Student's t."""
-        factor = self.student
-        return factor if factor == 1 else factor * (1 - 1 / self.count) ** -0.5
-
-    def chance(self, p: np.ndarray) -> np.ndarray:
-        """Return p of Student's t over labs, from p of the multiplied deviations."""
-        if self.student == 1:
-            return p
-        return 2 * stdtr(self.count - 1, self.student * ndtri(p / 2))
+        return _student(self.labs) * (1 - 1 / self.labs) ** -0.5 if self.labs > 1 else 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +129,8 @@ class Sample:
         drawn = value + self._widening * (self.drawn() - other.drawn(1) - value)
         beyond = np.minimum((drawn >= 0).sum(axis=0), (drawn <= 0).sum(axis=0))
         p = np.minimum(2 * (beyond + 1) / (RESAMPLES + 1), 1.0)
-        p = p if self.folds is None else self.folds.chance(p)
+        if self.folds and (labs := self.folds.labs) > 1:  # p has the tails of t
+            p = 2 * stdtr(labs - 1, _student(labs) * ndtri(p / 2))
         return np.where(np.isnan(drawn).any(axis=0), np.nan, p)
 
     def over(self, other: "Sample", *, trained_apart: bool = False) -> Interval:
@@ -177,6 +163,12 @@ class Sample:
             drawn = value + self._widening * (drawn - value)
         low, high = np.percentile(drawn, _ENDS, axis=0)
         return value, low, high
+
+
+def _student(count: int) -> float:
+    """Return half an interval of a mean of t, over that of a normal distribution."""
+    high = _ENDS[1] / 100
+    return float(stdtrit(count - 1, high) / ndtri(high))
 
 
 @lru_cache(maxsize=4)

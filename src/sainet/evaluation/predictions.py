@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
@@ -154,9 +153,7 @@ def _predict_pose(
     if stored is not None:
         stored = stored_prediction(stored, batch.initial, batch.controls)
     carry = dynamics.begin(batch.scene, batch.initial)
-    _, trajectory = dynamics.advance(batch.scene, carry, batch.controls, stored)
-    states = trajectory.states
-    return jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+    return dynamics.advance(batch.scene, carry, batch.controls, stored)[1].states.pose
 
 
 @dataclass(frozen=True)

@@ -99,12 +99,9 @@ def pose_errors(
     """Return predicted minus observed poses (m, m, rad); differentiable in values."""
     scene, engine = with_values(batch.scene, values, own)
     offset = camera_at(values)
-    start, controls = (
-        batch.initial.with_pusher_moved(offset),
-        batch.controls.moved(offset),
-    )
-    states = engine.rollout(scene, start, controls).states
-    pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+    start = batch.initial.with_pusher_moved(offset)
+    controls = batch.controls.moved(offset)
+    pose = engine.rollout(scene, start, controls).states.pose
     looks = steps[:, :, None, None]
     return jnp.take_along_axis(pose - batch.measured, looks, axis=1)
 

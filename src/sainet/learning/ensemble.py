@@ -190,8 +190,7 @@ def _calibrate(dynamics: Ensemble, camera: CameraOffset, held: Store) -> _Calibr
 def _ends(dynamics: Ensemble, batch: PushBatch) -> tuple[Array, Array, Array]:
     """Return mean poses, the deviations of final poses, and headings of pushes."""
     begun = dynamics.begin(batch.scene, batch.initial)
-    states = dynamics.advance(batch.scene, begun, batch.controls)[1].states
-    pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
+    pose = dynamics.advance(batch.scene, begun, batch.controls)[1].states.pose
     found = dynamics.spread(batch.scene, batch.initial, batch.controls)
     spread = jnp.concatenate([found.place, found.turn[..., None]], axis=-1)
     return pose, spread, found.heading

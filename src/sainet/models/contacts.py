@@ -58,11 +58,6 @@ class ContactFeatures(AbstractFeatures):
         return True
 
     @property
-    def has_place(self) -> bool:
-        """False: a contact has no place."""
-        return False
-
-    @property
     def pair_size(self) -> int:
         """Inputs of a contact of two disks."""
         return len(self.pair_signs)

@@ -41,9 +41,9 @@ class AbstractFeatures(ABC):
         """Whether the network takes the simulator prediction."""
 
     @property
-    @abstractmethod
     def has_place(self) -> bool:
         """Whether the network takes the place on the table."""
+        return False
 
     @property
     def are_standardised(self) -> bool:

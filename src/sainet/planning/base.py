@@ -123,9 +123,8 @@ def _path_and_rest(
     dynamics: AbstractDynamics, scene: Scene, state: State, push: Push, steps: int
 ) -> tuple[Float[Array, "1 time body 3"], State]:
     trajectory = roll_pushes(dynamics, batch_of(scene, 1), state, push, steps)
-    states, end = trajectory.states, trajectory.final
-    pose = jnp.concatenate([states.position, states.angle[..., None]], axis=-1)
-    return pose, at_rest(end.position, end.angle, end.pusher_position)
+    end = trajectory.final
+    return trajectory.states.pose, at_rest(end.position, end.angle, end.pusher_position)
 
 
 _compiled_path_and_rest = eqx.filter_jit(_path_and_rest)

@@ -78,7 +78,7 @@ class Share:
 
     def add(self, *pieces: str) -> None:
         """List finished pieces, by their names."""
-        path = _list(self.out, self.shard)
+        path = self.out / SHARDS / f"{self.shard.number}-of-{self.shard.count}.json"
         known = _read(path).names if path.exists() else ()
         write_document(path, Pieces(list(dict.fromkeys((*known, *pieces)))))
 
@@ -161,10 +161,6 @@ def _check_versions(folder: Path) -> None:
                 f"{folder / MANIFEST}: {name} is {before.get(name)}, not {version}; "
                 "use the version that began, or choose another `out`."
             )
-
-
-def _list(out: Path, shard: Shard) -> Path:
-    return out / SHARDS / f"{shard.number}-of-{shard.count}.json"
 
 
 def _lists(out: Path) -> list[Path]:

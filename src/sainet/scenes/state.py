@@ -45,6 +45,11 @@ class State(eqx.Module):
         """The number of disks."""
         return self.angle.shape[-1]
 
+    @property
+    def pose(self) -> Float[Array, "*batch body 3"]:
+        """Position and angle in one array (m, m, rad)."""
+        return jnp.concatenate([self.position, self.angle[..., None]], axis=-1)
+
     def with_pusher_moved(self, offset: Float[Array, "*#batch 2"]) -> "State":
         """Return states with the pusher displaced by an offset (m)."""
         offset = jnp.broadcast_to(offset, self.pusher_position.shape)
@@ -163,9 +168,8 @@ def pack_motion(state: State) -> Float[Array, "*batch body 6"]:
 
     Datasets and networks use this array.
     """
-    pose = jnp.concatenate([state.position, state.angle[..., None]], axis=-1)
     rate = jnp.concatenate([state.velocity, state.spin[..., None]], axis=-1)
-    return jnp.concatenate([pose, rate], axis=-1)
+    return jnp.concatenate([state.pose, rate], axis=-1)
 
 
 def unpack_motion(

@@ -45,6 +45,7 @@ CONTACTS = ModelId(
 )
 MIXED = structs.replace(CONTACTS, variant="one-to-four")
 ASSUMED = structs.replace(CONTACTS, simulator=SIMULATORS["planar"])
+ASSUMED_MIXED = structs.replace(ASSUMED, variant="one-to-four")
 TRAINED = (1, 2, 3, 4)  # disks
 TESTED = (2, 3, 5, 8)  # disks; two have one arrangement
 # Around the engine with assumed properties: disks, and a recipe that was chosen on
@@ -99,12 +100,14 @@ def of_two(
     return tuple(Train(network, pushes, each) for each in _recipes(scope, recipe))
 
 
-def of_one_to_four(scope: Scope) -> tuple[TrainMixture, ...]:
+def of_one_to_four(
+    scope: Scope, network: ModelId = MIXED, recipe: Recipe = CONTACT
+) -> tuple[TrainMixture, ...]:
     """Return contact networks that are trained on pushes of one to four disks."""
     first, *others = (training_pushes(scope.scale, disks) for disks in TRAINED)
     return tuple(
-        TrainMixture(MIXED, first, recipe, more=tuple(others))
-        for recipe in _recipes(scope)
+        TrainMixture(network, first, each, more=tuple(others))
+        for each in _recipes(scope, recipe)
     )
 
 
@@ -134,13 +137,13 @@ def _conditions(tested: tuple[int, ...] = TESTED) -> Iterator[_Condition]:
 
 def _numbers(scope: Scope) -> Plan:
     """Return the errors against the number of disks, in each arrangement."""
-    models = (*_models(scope), *of_one_to_four(scope))
-    return _compare(scope, models, _conditions())
+    return _compare(scope, (*_models(scope), *of_one_to_four(scope)), _conditions())
 
 
 def _assumed(scope: Scope) -> Plan:
     """Return the errors around the engine with assumed properties."""
-    models = (*physics(), *of_two(scope, ASSUMED, FOR_ASSUMED))
+    mixed = of_one_to_four(scope, ASSUMED_MIXED, FOR_ASSUMED)
+    models = (*physics(), *of_two(scope, ASSUMED, FOR_ASSUMED), *mixed)
     return _compare(scope, models, _conditions(OF_ASSUMED))
 
 
@@ -204,7 +207,7 @@ NUMBERS = Study(
 )
 ASSUMED_STUDY = Study(
     question="How much of the error of an engine with assumed properties does a "
-    "contact network of two disks remove, with two disks and with more?",
+    "contact network remove, with two disks and with more?",
     plan=_assumed,
     subject=ASSUMED.slug,
 )

@@ -238,7 +238,7 @@ class World:
             (x, y, _), turn = self._bullet.getBasePositionAndOrientation(
                 body, self._client
             )
-            angle = old[2] + _wrapped(_yaw(turn) - old[2])
+            angle = old[2] + math.remainder(_yaw(turn) - old[2], 2 * math.pi)
             after[row, 0:3] = x, y, angle
         after[:, 3:6] = (after[:, 0:3] - before[:, 0:3]) / time_step
         return after
@@ -259,10 +259,6 @@ def _own_group(index: int) -> int:
 def _yaw(turn: tuple[float, float, float, float]) -> float:
     x, y, z, w = turn
     return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-
-
-def _wrapped(angle: float) -> float:
-    return math.remainder(angle, 2 * math.pi)
 
 
 _lock = threading.Lock()

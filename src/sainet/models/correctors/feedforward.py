@@ -68,11 +68,6 @@ class WholeState(AbstractFeatures):
         return self.each.has_simulator
 
     @property
-    def has_place(self) -> bool:
-        """False: the state is in the push frame."""
-        return False
-
-    @property
     def pair_size(self) -> int:
         """None: there are no pairs."""
         return 0

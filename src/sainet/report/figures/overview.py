@@ -135,7 +135,8 @@ def draw_panels(panels: Sequence[Panel], path: Path) -> Path:
         path: where to write; ``.svg`` or ``.png``.
     """
     with canvas.house_look():
-        figure = canvas.new_figure(4 + 3.6 * len(panels), _height(panels[0].sections))
+        rows = sum(len(section.dots) + 1.6 for section in panels[0].sections)
+        figure = canvas.new_figure(4 + 3.6 * len(panels), _ENDS + _ROW * rows)
         places = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
         for panel, axes in zip(panels, places, strict=True):
             _draw(axes, panel.sections, named=axes is places[0])
@@ -206,10 +207,6 @@ def _successes(part: Part) -> Iterator[Dot]:
     for row in rows:
         known = published.get(row.model)
         yield Dot(styles[row.model], row.success, *row.interval, known)
-
-
-def _height(sections: Sequence[Section]) -> float:
-    return _ENDS + _ROW * sum(len(section.dots) + 1.6 for section in sections)
 
 
 def _draw(axes: Axes, sections: Sequence[Section], *, named: bool) -> None:

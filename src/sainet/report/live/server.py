@@ -209,7 +209,8 @@ class LivePage:
             return _refusal(_FORBIDDEN, "Open this page by its own address.")
         if request.path != SOCKET:
             asset = self._files.get(request.path.partition("?")[0])
-            return _refusal(_MISSING, "No such page.") if asset is None else _ok(asset)
+            missing = _refusal(_MISSING, "No such page.")
+            return _response(200, asset) if asset else missing
         if request.headers.get_all("Origin") != [f"http://{hosts[0]}"]:
             return _refusal(_FORBIDDEN, "Another page may not connect.")
         if len(self._connections) >= _MOST_CONNECTIONS:
@@ -222,10 +223,6 @@ _TOO_MANY = Notice("Too many messages at once; some were dropped.")
 
 def _refusal(status: int, reason: str) -> "Response":
     return _response(status, Asset("text/plain", f"{reason}\n".encode()))
-
-
-def _ok(asset: Asset) -> "Response":
-    return _response(200, asset)
 
 
 def _response(status: int, asset: Asset) -> "Response":
