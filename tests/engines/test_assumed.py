@@ -5,12 +5,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from contracts.worlds import pushed
+from contracts.worlds import far_away, moving, pushed
 from sainet.datasets.config import GenerateConfig
 from sainet.engines import make_engine
 from sainet.engines.base import AssumedProperties, roll_out
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.engines.simulator import TRUE_PROPERTIES, Assumptions
+from sainet.engines.simulator import SIMULATORS, TRUE_PROPERTIES, Assumptions
 from sainet.runs.errors import UnknownName
 from sainet.scenes.scene import FrictionField
 
@@ -73,3 +73,38 @@ def test_an_unknown_engine_lists_the_available_engines():
         UnknownName, match="'plannar' .did you mean planar.*Available: .*planar"
     ):
         make_engine("plannar")
+
+
+def overlap_of(scene, position):
+    """How far the assumed disks of clusters of three are in each other (m), by step."""
+    radius = AssumedProperties(PlanarEngine()).assume(scene).radius[:, None]
+    pairs = np.array([[0, 1], [0, 2], [1, 2]])
+    first, second = (position[..., pairs[:, side], :] for side in (0, 1))
+    sums = radius[..., pairs].sum(axis=-1)
+    return sums - np.linalg.norm(first - second, axis=-1)
+
+
+def test_disks_that_overlap_stay_so_or_are_moved_apart():
+    scene, initial, _ = pushed(GenerateConfig(disks=3, pushes=20), 0, 1)
+    deep = overlap_of(scene, initial.position[:, None]).max(axis=(1, 2)) > 1e-3
+    assert 5 < deep.sum() < 20
+    start = moving(initial.position, np.zeros_like(initial.position))
+
+    def travel(name):
+        simulator = SIMULATORS[name].build()
+        end = roll_out(simulator, scene, start, far_away(20, 60)).final
+        return np.linalg.norm(end.position - start.position, axis=-1).max(axis=-1)
+
+    assert travel("planar")[deep].min() > 3e-4
+    assert travel("planar-overlap").max() < 1e-7
+
+
+def test_pushed_disks_do_not_sink_further_into_each_other():
+    push = pushed(GenerateConfig(disks=3, pushes=20), 0, 200)
+    states = roll_out(SIMULATORS["planar-overlap"].build(), *push).states
+    scene, initial, _ = push
+    start = overlap_of(scene, initial.position[:, None])
+    later = overlap_of(scene, states.position)
+    assert np.all(later < np.maximum(start, 0) + 3e-4)
+    travel = np.linalg.norm(states.position[:, -1] - initial.position, axis=-1)
+    assert travel.max() > 0.01

@@ -4,6 +4,7 @@ import json
 import re
 import signal
 from contextlib import suppress
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from learning.stores import (
+    QUIET,
     end_points_alone,
     info_of,
     made_up,
@@ -19,6 +21,7 @@ from learning.stores import (
     write,
 )
 from sainet.datasets.batch import to_batch
+from sainet.datasets.generate import generate
 from sainet.datasets.schema import simulated_name
 from sainet.learning import fit as fit_module
 from sainet.learning import sources as sources_module
@@ -245,6 +248,21 @@ def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
     with pytest.raises(BadStore, match=says):
         fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_prediction_that_the_data_lack_is_computed(store, tmp_path):
+    both = replace(QUIET, assumed_engine=("planar", "planar-overlap"))
+    stores = generate(both, tmp_path / "both"), store
+    recipe = CONFIG.changed(iterations=5)
+    trained = [
+        fit("sain", each, recipe, tmp_path / name, assumed_engine="planar-overlap")
+        for name, each in zip(("stored", "computed"), stores, strict=True)
+    ]
+    networks = (load_network(each.folder)[0] for each in trained)
+    first, second = (jax.tree.leaves(eqx.filter(n, eqx.is_array)) for n in networks)
+    assert len(first) == len(second) > 10
+    for one, other in zip(first, second, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-6)
 
 
 def test_at_least_one_push_remains_for_training(store, tmp_path):

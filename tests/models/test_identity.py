@@ -19,6 +19,17 @@ FITTED = PlanarSpec(assumptions=Assumptions(pusher_friction=0.2))
             "physics-true",
             "Physics, true properties",
         ),
+        *(
+            (ModelId(kind="physics", simulator=SIMULATORS[name]), slug, label)
+            for name, slug, label in (
+                ("planar-overlap", "physics-overlap", "Physics, overlaps kept"),
+                (
+                    "planar-true-overlap",
+                    "physics-true-overlap",
+                    "Physics, true properties, overlaps kept",
+                ),
+            )
+        ),
         (ModelId(kind="in"), "in", "IN"),
         (ModelId(kind="in", data="stroke"), "in-stroke", "IN, stroke"),
         (ModelId(kind="sain", simulator=PLANAR), "sain", "SAIN"),
@@ -32,6 +43,7 @@ FITTED = PlanarSpec(assumptions=Assumptions(pusher_friction=0.2))
             (ModelId(kind="sain", simulator=SIMULATORS[name]), slug, label)
             for name, slug, label in (
                 ("planar-true", "sain-true", "SAIN, true properties"),
+                ("planar-overlap", "sain-overlap", "SAIN, overlaps kept"),
                 (
                     "bullet-true",
                     "sain-bullet-true",
@@ -54,3 +66,13 @@ FITTED = PlanarSpec(assumptions=Assumptions(pusher_friction=0.2))
 )
 def test_names_follow_from_the_fields(identity: ModelId, slug: str, label: str):
     assert (identity.slug, identity.label) == (slug, label)
+
+
+def test_fields_that_are_unset_are_not_in_representations():
+    """Run folders are named by them, and keep their names when a field is added."""
+    usual = repr(ModelId(kind="sain", simulator=PLANAR))
+    assert "abstains" not in usual
+    assert "keeps_overlaps" not in usual
+    other = ModelId(kind="sain", simulator=SIMULATORS["planar-overlap"]).abstaining
+    assert "abstains=True" in repr(other)
+    assert "keeps_overlaps=True" in repr(other)

@@ -10,7 +10,7 @@ from msgspec import structs, to_builtins
 from models.samples import identified_folder
 from models.test_checkpoint import edit_card, edit_simulator, write_network
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.engines.simulator import TRUE_PROPERTIES
+from sainet.engines.simulator import SIMULATORS, TRUE_PROPERTIES
 from sainet.models.card import CARD, IDENTIFIED, read_identified
 from sainet.models.dynamics import LearnedDynamics, SimulatorAugmented
 from sainet.models.library import (
@@ -59,6 +59,25 @@ def test_a_network_keeps_its_engine_unless_it_is_forced(folder):
     assert isinstance(forced.engine.engine, PlanarEngine)
     # It has the assumed properties of its training.
     assert forced.engine.assumptions.table_friction == 0.2
+
+
+def test_an_engine_that_keeps_overlaps_is_another_engine(folder):
+    edit_simulator(folder, keeps_overlaps=True)
+    says = "its internal engine is 'planar-overlap', not 'planar'"
+    with pytest.raises(BadCheckpoint, match=says):
+        load_model(str(folder), engine="planar")
+    found = load_model(str(folder), engine="planar-overlap").dynamics
+    assert isinstance(found, SimulatorAugmented)
+    assert found.engine.engine.recovery == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "simulator"),
+    [("physics", "planar-overlap"), ("physics-true", "planar-true-overlap")],
+)
+def test_physics_may_keep_overlaps(name, simulator):
+    model = load_model(name, engine="planar-overlap")
+    assert model.id.simulator == SIMULATORS[simulator]
 
 
 def test_an_engine_with_true_properties_is_the_same_engine(folder):

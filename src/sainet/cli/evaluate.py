@@ -39,8 +39,8 @@ class Evaluate:
     steps: int | None = None
     """Number of steps to predict; 0 for all. Default: 200; all for recorded pushes."""
     engine: str | None = None
-    """Internal engine of the models. Default: planar for physics; for networks, the
-    engine of their training."""
+    """Internal engine of the models: planar, planar-overlap or bullet. Default: planar
+    for physics; for networks, the engine of their training."""
     force: bool = False
     """Skip data and engine compatibility checks."""
     abstain: bool = False

@@ -98,8 +98,9 @@ class Train(Training):
     model: Positional[ModelKind]
     """Network: in (without an engine) or sain (around an engine)."""
     assumed_engine: str = "planar"
-    """Internal engine of SAIN: a simulator whose prediction the dataset contains, or
-    the folder of identified parameters ('sainet identify')."""
+    """Internal engine of SAIN: planar, planar-overlap, another simulator whose
+    prediction the dataset contains, or the folder of identified parameters ('sainet
+    identify')."""
     single_steps: bool = False
     """Train on single steps, each from the true state (the paper's figure 2c), instead
     of whole pushes."""

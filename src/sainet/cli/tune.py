@@ -81,9 +81,9 @@ class Tune(Training):
     the folder of a trained network."""
     engine: str | None = None
     """Internal engine: the folder of identified parameters ('sainet identify'), or a
-    simulator whose prediction the dataset contains (default: planar, with the masses
-    and radii of the paper's disks, for SAIN; gp identifies the engine on the same
-    pushes)."""
+    simulator: planar, planar-overlap, or one whose prediction the dataset contains
+    (default: planar, with the masses and radii of the paper's disks, for SAIN; gp
+    identifies the engine on the same pushes)."""
     changes: Changes = field(default_factory=Changes)
     output: Output = field(default_factory=Output)
 

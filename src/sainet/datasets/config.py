@@ -25,8 +25,8 @@ class GenerateConfig(WorldConfig):
     """Engine of the ground truth: planar or bullet."""
     assumed_engine: tuple[str, ...] = ("planar",)
     """Engines of the stored simulator predictions: planar or bullet with the paper's
-    assumed properties, planar-true or bullet-true with the true masses and
-    radii."""
+    assumed properties, planar-true or bullet-true with the true masses and radii.
+    planar-overlap and planar-true-overlap do not move disks apart that overlap."""
     seed: int = 0
     """Random seed; equal seeds give byte-identical datasets."""
     chunk_size: int = 250

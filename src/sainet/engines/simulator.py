@@ -6,13 +6,15 @@ JAX until then.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import msgspec
 
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import UnknownName, unknown_name
+from sainet.runs.folders import representation
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
 from sainet.scenes.recording import AGREES, CameraOffset
 
@@ -71,6 +73,11 @@ class _Spec(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
         return f"{self.engine}-{content_hash(msgspec.json.encode(self))[:_DIGEST]}"
 
     @property
+    def chosen_as(self) -> str:
+        """The name of the engine where its assumptions are chosen separately."""
+        return self.engine
+
+    @property
     def stored_as(self) -> str:
         """The name of its predictions in datasets; later versions have other names."""
         return self.slug if self.version == 1 else f"{self.slug}.v{self.version}"
@@ -85,8 +92,19 @@ class PlanarSpec(_Spec, frozen=True, kw_only=True, tag="planar"):
     """The planar engine."""
 
     pressure_radius_ratio: PressureRatio = UNIFORM_PRESSURE
+    # Whether disks that overlap at the start stay so, instead of being moved apart.
+    keeps_overlaps: Literal[True] | msgspec.UnsetType = msgspec.UNSET
 
     engine: ClassVar[str] = "planar"
+
+    def __repr__(self) -> str:
+        """Return the fields, without those that are unset."""
+        return representation(self)
+
+    @property
+    def chosen_as(self) -> str:
+        """The name of the engine where its assumptions are chosen separately."""
+        return f"{self.engine}-overlap" if self.keeps_overlaps else self.engine
 
     def build(self) -> "AssumedProperties":
         """Return the engine with its assumptions."""
@@ -94,6 +112,8 @@ class PlanarSpec(_Spec, frozen=True, kw_only=True, tag="planar"):
         from sainet.engines.planar.engine import PlanarEngine
 
         engine = PlanarEngine(pressure_radius_ratio=self.pressure_radius_ratio)
+        if self.keeps_overlaps:
+            engine = replace(engine, recovery=0.0)
         return AssumedProperties(engine, self.assumptions)
 
 
@@ -169,6 +189,10 @@ SIMULATORS: Mapping[str, SimulatorSpec] = MappingProxyType(
     {
         "planar": PlanarSpec(),
         "planar-true": PlanarSpec(assumptions=TRUE_PROPERTIES),
+        "planar-overlap": PlanarSpec(keeps_overlaps=True),
+        "planar-true-overlap": PlanarSpec(
+            assumptions=TRUE_PROPERTIES, keeps_overlaps=True
+        ),
         "bullet": BulletSpec(),
         "bullet-true": BulletSpec(assumptions=TRUE_PROPERTIES),
     }

@@ -110,14 +110,16 @@ def other_disks(task: Task) -> Iterator[str]:
 
 def _check_simulator(task: Task) -> None:
     info, path, simulator = task.store.info, task.store.path, task.assumed.simulator
-    is_listed = simulator.slug in SIMULATORS
-    if is_listed and simulator.slug not in info.assumed_engines:
+    if simulator.slug in info.assumed_engines:
+        return
+    is_robot = info.kind == "robot"
+    if simulator.slug in SIMULATORS and not (is_robot and simulator.engine == "planar"):
         raise BadStore(
             f"{path}: no simulator prediction of {simulator.slug}; use "
             f"{' or '.join(info.assumed_engines)}, or the folder of identified "
             "parameters."
         )
-    if not is_listed and info.kind != "robot":
+    if not is_robot:
         raise BadStore(
             f"{path}: kind is {info.kind!r}; identified engines and engines of your "
             "own predict pushes of the robot setup."

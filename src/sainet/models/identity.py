@@ -5,6 +5,7 @@ from typing import Literal, get_args
 import msgspec
 
 from sainet.engines.simulator import PAPER, TRUE_PROPERTIES, OwnSpec, SimulatorSpec
+from sainet.runs.folders import representation
 
 Kind = Literal["physics", "in", "sain", "gp", "published"]
 # Pushes that a network was trained on: the paper's simulated pushes; simulated strokes;
@@ -89,12 +90,8 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     abstains: Literal[True] | msgspec.UnsetType = msgspec.UNSET
 
     def __repr__(self) -> str:
-        """Return the fields; without `abstains` where unset, as before it existed.
-
-        Representations name the run folders of studies, which then stay the same.
-        """
-        shown = self.__struct_fields__[: None if self.abstains else -1]
-        return f"ModelId({', '.join(f'{k}={getattr(self, k)!r}' for k in shown)})"
+        """Return the fields, without those that are unset."""
+        return representation(self)
 
     @property
     def abstaining(self) -> "ModelId":
@@ -112,7 +109,7 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
         """The name for readers."""
         if self.name:
             return self.name
-        kinds, words = _KINDS, filter(None, self._parts()[2:])
+        kinds, words = _KINDS, filter(None, self._parts()[3:])
         if self.features == "contact":  # always residuals
             words = (word for word in words if word != self.data)
         if self.features == "whole-state":
@@ -130,22 +127,28 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
             _ABSTAINING if self.abstains else "",
         ]
 
-    def _simulator_parts(self) -> tuple[str, str]:
-        """Return the engine, empty where usual, and the properties that it assumes."""
+    def _simulator_parts(self) -> tuple[str, str, str]:
+        """Return the engine, its properties, and whether it keeps overlaps.
+
+        Each is empty where usual.
+        """
         if self.simulator is None or self.kind == "in":
-            return "", ""
+            return "", "", ""
         if isinstance(self.simulator, OwnSpec):
-            return self.simulator.name, ""
+            return self.simulator.name, "", ""
         # Physics is named for what it assumes, not for its engine.
-        is_usual = self.kind == "physics" or self.simulator.engine == "planar"
+        engine = self.simulator.engine
+        is_usual = self.kind == "physics" or engine == "planar"
         known = {PAPER: "", TRUE_PROPERTIES: "true"}
         properties = known.get(self.simulator.assumptions, "identified")
-        return "" if is_usual else self.simulator.engine, properties
+        overlaps = "overlap" if self.simulator.chosen_as != engine else ""
+        return "" if is_usual else engine, properties, overlaps
 
     def _engine_label(self) -> str:
-        engine, properties = self._simulator_parts()
+        engine, properties, overlaps = self._simulator_parts()
         around = engine and f" around {engine.capitalize()}"
-        return around + _PROPERTIES_LABELS[properties]
+        kept = overlaps and ", overlaps kept"
+        return around + _PROPERTIES_LABELS[properties] + kept
 
 
 _PROPERTIES_LABELS = {"": "", "true": ", true properties", "identified": ", identified"}

@@ -168,7 +168,7 @@ def physics_simulator(name: str, engine: str) -> SimulatorSpec:
         UnknownName: no simulator combines them.
     """
     assumed, each = PHYSICS[name], SIMULATORS.values()
-    known = {spec.engine: spec for spec in each if spec.assumptions == assumed}
+    known = {spec.chosen_as: spec for spec in each if spec.assumptions == assumed}
     if engine not in known:
         raise errors.unknown_name("engine", engine, known)
     return known[engine]
@@ -240,12 +240,13 @@ def _internal(
     force: bool,
 ) -> SimulatorSpec:
     """Return the simulator that a network is put around."""
-    if engine is None or engine == own.engine:
+    if engine in (None, own.chosen_as):
         return own
     if not force:
         raise errors.BadCheckpoint(
-            f"{folder / CARD}: its internal engine is {own.engine!r}, not {engine!r}; "
-            "leave `engine` out, train a network around that engine, or give `force`."
+            f"{folder / CARD}: its internal engine is {own.chosen_as!r}, not "
+            f"{engine!r}; leave `engine` out, train a network around that engine, or "
+            "give `force`."
         )
     other = simulator_named(engine)
     return msgspec.structs.replace(other, assumptions=own.assumptions)

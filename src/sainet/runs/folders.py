@@ -174,3 +174,13 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
                 f"{path / CONFIG}: {shown(name)} is {shown(found.get(name))}, not "
                 f"{shown(wanted.get(name))}; choose another `out` or the same settings."
             )
+
+
+def representation(value: msgspec.Struct) -> str:
+    """Return the fields of a structure, without those that are unset.
+
+    Representations name the run folders of studies: they stay when a field is added.
+    """
+    fields = {name: getattr(value, name) for name in value.__struct_fields__}
+    shown = [f"{k}={v!r}" for k, v in fields.items() if v is not msgspec.UNSET]
+    return f"{type(value).__name__}({', '.join(shown)})"

@@ -46,6 +46,8 @@ CONTACTS = ModelId(
 MIXED = structs.replace(CONTACTS, variant="one-to-four")
 ASSUMED = structs.replace(CONTACTS, simulator=SIMULATORS["planar"])
 ASSUMED_MIXED = structs.replace(ASSUMED, variant="one-to-four")
+OVERLAP = structs.replace(CONTACTS, simulator=SIMULATORS["planar-overlap"])
+OVERLAP_MIXED = structs.replace(OVERLAP, variant="one-to-four")
 TRAINED = (1, 2, 3, 4)  # disks
 TESTED = (2, 3, 5, 8)  # disks; two have one arrangement
 # Around the engine with assumed properties: disks, and a recipe that was chosen on
@@ -142,8 +144,12 @@ def _numbers(scope: Scope) -> Plan:
 
 def _assumed(scope: Scope) -> Plan:
     """Return the errors around the engine with assumed properties."""
-    mixed = of_one_to_four(scope, ASSUMED_MIXED, FOR_ASSUMED)
-    models = (*physics(), *of_two(scope, ASSUMED, FOR_ASSUMED), *mixed)
+    two = (of_two(scope, each, FOR_ASSUMED) for each in (ASSUMED, OVERLAP))
+    mixed = (
+        of_one_to_four(scope, each, FOR_ASSUMED)
+        for each in (ASSUMED_MIXED, OVERLAP_MIXED)
+    )
+    models = (*physics(), physics("planar-overlap")[0], *chain(*two, *mixed))
     return _compare(scope, models, _conditions(OF_ASSUMED))
 
 
