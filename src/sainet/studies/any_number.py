@@ -7,7 +7,6 @@ radii; the paper's networks are trained on two disks by the recipe of Table III.
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import chain, product
-from typing import TYPE_CHECKING
 
 from msgspec import structs
 
@@ -30,12 +29,10 @@ from sainet.studies.paper_setup import (
     in_batches,
     physics,
 )
+from sainet.studies.runner import Runner
 from sainet.studies.steps import Evaluate, Join, Simulate, Step, Train
 from sainet.studies.study import Plan, Scope, Study
 from sainet.worlds.config import Arrangement
-
-if TYPE_CHECKING:
-    from sainet.studies.runner import Runner
 
 CONTACTS = ModelId(
     kind="sain",
@@ -44,17 +41,17 @@ CONTACTS = ModelId(
     features="contact",
 )
 MIXED = structs.replace(CONTACTS, variant="one-to-four")
+# Around the engine with assumed properties, which moves disks apart or lets them be.
 ASSUMED = structs.replace(CONTACTS, simulator=SIMULATORS["planar"])
-ASSUMED_MIXED = structs.replace(ASSUMED, variant="one-to-four")
 OVERLAP = structs.replace(CONTACTS, simulator=SIMULATORS["planar-overlap"])
-OVERLAP_MIXED = structs.replace(OVERLAP, variant="one-to-four")
 TRAINED = (1, 2, 3, 4)  # disks
 TESTED = (2, 3, 5, 8)  # disks; two have one arrangement
-# Around the engine with assumed properties: disks, and a recipe that was chosen on
-# pushes of two and of three disks with other seeds. Disks begin and cease to move at
-# other times than in the engine, so the residual changes from step to step.
+# Of networks around it: disks, and recipes that were chosen on pushes of two and of
+# three disks with other seeds. Disks begin and cease to move at other times than in the
+# engine, so the residual changes from step to step.
 OF_ASSUMED = TESTED[:3]
 FOR_ASSUMED = CONTACT.changed(hold=1, l2=1e-4)
+FOR_OVERLAP = FOR_ASSUMED.changed(iterations=3600, halve_every=1200)  # of one to four
 ARRANGEMENTS: tuple[Arrangement, ...] = ("cluster", "row", "triangle")
 GAPS_MM = (-2, -1, 0, 1, 2, 5)
 # Training pushes of each number of disks, test pushes of each condition, iterations.
@@ -69,7 +66,7 @@ class TrainMixture(Train):
 
     more: tuple[Step[Store], ...] = ()  # further training pushes
 
-    def stores(self, runner: "Runner") -> tuple[Store, ...]:
+    def stores(self, runner: Runner) -> tuple[Store, ...]:
         """Return the training pushes, one dataset for each number of disks."""
         return tuple(runner.result(each) for each in (self.pushes, *self.more))
 
@@ -103,10 +100,11 @@ def of_two(
 
 
 def of_one_to_four(
-    scope: Scope, network: ModelId = MIXED, recipe: Recipe = CONTACT
+    scope: Scope, network: ModelId = CONTACTS, recipe: Recipe = CONTACT
 ) -> tuple[TrainMixture, ...]:
     """Return contact networks that are trained on pushes of one to four disks."""
     first, *others = (training_pushes(scope.scale, disks) for disks in TRAINED)
+    network = structs.replace(network, variant=MIXED.variant)
     return tuple(
         TrainMixture(network, first, each, more=tuple(others))
         for each in _recipes(scope, recipe)
@@ -145,27 +143,22 @@ def _numbers(scope: Scope) -> Plan:
 def _assumed(scope: Scope) -> Plan:
     """Return the errors around the engine with assumed properties."""
     two = (of_two(scope, each, FOR_ASSUMED) for each in (ASSUMED, OVERLAP))
-    mixed = (
-        of_one_to_four(scope, each, FOR_ASSUMED)
-        for each in (ASSUMED_MIXED, OVERLAP_MIXED)
-    )
+    recipes = (ASSUMED, FOR_ASSUMED), (OVERLAP, FOR_OVERLAP)
+    mixed = (of_one_to_four(scope, *each) for each in recipes)
     models = (*physics(), physics("planar-overlap")[0], *chain(*two, *mixed))
     return _compare(scope, models, _conditions(OF_ASSUMED))
 
 
 def _gaps(scope: Scope) -> Plan:
     """Return the errors of two disks against the gap between them at the start."""
-    return _compare(
-        scope,
-        _models(scope),
+    conditions = (
         (
-            (
-                GenerateConfig(gap_mm=gap),
-                Condition(label=f"gap of {gap} mm", factors={"gap_mm": gap}),
-            )
-            for gap in GAPS_MM
-        ),
+            GenerateConfig(gap_mm=gap),
+            Condition(label=f"gap of {gap} mm", factors={"gap_mm": gap}),
+        )
+        for gap in GAPS_MM
     )
+    return _compare(scope, _models(scope), conditions)
 
 
 def _compare(
