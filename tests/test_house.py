@@ -386,7 +386,7 @@ CONNECTIONS = {
     "what further reviews found": 134,
     "a shorter training beside the paper's recipe": 27,
     "pushes of many lengths, predicted and judged in few programs": 14,
-    "an engine that keeps overlaps": 27,
+    "an engine that keeps overlaps": 24,
     # Shares of datasets, trials and evaluations, the options of five commands, and
     # where steps run, which stood in studies/shares.py before.
     "many machines": 245,

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sainet.cli.output import Bars, Output, progress_bar
+from sainet.runs.errors import BadInput
 from sainet.runs.progress import Pace
 from sainet.studies.runner import Progress
 
@@ -59,6 +60,17 @@ def test_before_the_first_unit_the_bar_shows_compiling(capsys, monkeypatch):
     shown = capsys.readouterr().err
     assert "compiling" in shown
     assert "0/2" not in shown
+
+
+@pytest.mark.parametrize("done", [0, 1])
+def test_a_bar_stays_only_if_something_was_done_before_an_error(done, capsys):
+    with (
+        pytest.raises(BadInput),
+        progress_bar("Training", 2, Output()) as advance,
+    ):
+        advance(done)
+        raise BadInput("no simulator prediction")
+    assert ("Training" in capsys.readouterr().err) == bool(done)
 
 
 @pytest.mark.parametrize("amounts", [(), (2,), (1, 1)])

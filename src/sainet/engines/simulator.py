@@ -14,7 +14,7 @@ import msgspec
 
 from sainet.runs.documents import content_hash
 from sainet.runs.errors import UnknownName, unknown_name
-from sainet.runs.folders import representation
+from sainet.runs.folders import Keyed
 from sainet.scenes.quantities import Friction, Mass, PressureRatio, Radius
 from sainet.scenes.recording import AGREES, CameraOffset
 
@@ -56,7 +56,7 @@ PAPER = Assumptions(mass=PAPER_MASS, radius=PAPER_RADIUS, table_friction=PAPER_F
 TRUE_PROPERTIES = Assumptions(table_friction=PAPER_FRICTION)
 
 
-class _Spec(msgspec.Struct, frozen=True, kw_only=True, tag_field="engine"):
+class _Spec(Keyed, frozen=True, kw_only=True, tag_field="engine"):
     """What the specifications of all engines have in common."""
 
     assumptions: Assumptions = PAPER
@@ -96,10 +96,6 @@ class PlanarSpec(_Spec, frozen=True, kw_only=True, tag="planar"):
     keeps_overlaps: Literal[True] | msgspec.UnsetType = msgspec.UNSET
 
     engine: ClassVar[str] = "planar"
-
-    def __repr__(self) -> str:
-        """Return the fields, without those that are unset."""
-        return representation(self)
 
     @property
     def chosen_as(self) -> str:

@@ -5,7 +5,7 @@ from typing import Literal, get_args
 import msgspec
 
 from sainet.engines.simulator import PAPER, TRUE_PROPERTIES, OwnSpec, SimulatorSpec
-from sainet.runs.folders import representation
+from sainet.runs.folders import Keyed
 
 Kind = Literal["physics", "in", "sain", "gp", "published"]
 # Pushes that a network was trained on: the paper's simulated pushes; simulated strokes;
@@ -73,7 +73,7 @@ _VARIANTS = {
 }
 
 
-class ModelId(msgspec.Struct, frozen=True, kw_only=True):
+class ModelId(Keyed, frozen=True, kw_only=True):
     """The identity of a model: equal identities name the same kind of model.
 
     `slug` is its name in commands, tables and JSON, `label` its name for readers. Both
@@ -88,10 +88,6 @@ class ModelId(msgspec.Struct, frozen=True, kw_only=True):
     name: str = ""  # given by a user or publication; replaces the computed names
     # Whether an engine predicts in its place on surfaces that it was not fitted to.
     abstains: Literal[True] | msgspec.UnsetType = msgspec.UNSET
-
-    def __repr__(self) -> str:
-        """Return the fields, without those that are unset."""
-        return representation(self)
 
     @property
     def abstaining(self) -> "ModelId":

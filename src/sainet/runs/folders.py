@@ -176,11 +176,14 @@ def _check_same(path: Path, found: dict[str, Any], wanted: dict[str, Any]) -> No
             )
 
 
-def representation(value: msgspec.Struct) -> str:
-    """Return the fields of a structure, without those that are unset.
+class Keyed(msgspec.Struct, frozen=True):
+    """A structure whose representation names run folders of studies.
 
-    Representations name the run folders of studies: they stay when a field is added.
+    It leaves out fields that are unset: names stay when a structure gets a field.
     """
-    fields = {name: getattr(value, name) for name in value.__struct_fields__}
-    shown = [f"{k}={v!r}" for k, v in fields.items() if v is not msgspec.UNSET]
-    return f"{type(value).__name__}({', '.join(shown)})"
+
+    def __repr__(self) -> str:
+        """Return the fields, without those that are unset."""
+        fields = {name: getattr(self, name) for name in self.__struct_fields__}
+        shown = [f"{k}={v!r}" for k, v in fields.items() if v is not msgspec.UNSET]
+        return f"{type(self).__name__}({', '.join(shown)})"

@@ -75,6 +75,10 @@ def progress_bar(
                 rate=f"{rate:.1f}/s" if rate and rate >= _SLOW else "",
             )
 
-        yield advance
+        try:
+            yield advance
+        except Exception:
+            bar.live.transient = pace.begun is None  # refused before anything was done
+            raise
         if pace.begun is None:  # everything was finished before
             bar.update(task, total=total, completed=total or 0, note="")
