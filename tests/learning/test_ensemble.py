@@ -166,7 +166,7 @@ def test_pushes_that_the_engine_was_identified_on_are_refused(store, tmp_path):
     known = digests_to_text(store.push_hashes()[-15:])
     engine = InternalEngine(SIMULATORS["planar"], pushes=known)
     some = store.first(50)
-    fit_ensemble("sain", some, RECIPE, tmp_path, members=2, assumed_engine=engine)
+    fit_ensemble("sain", some, RECIPE, tmp_path, members=2, engine=engine)
     with pytest.raises(BadCheckpoint, match="was trained on 10 of these 10"):
         evaluate([load_model(str(tmp_path))], store.take(range(50, 60)))
     with pytest.raises(BadCheckpoint, match="network was trained on 10 of these 10"):
@@ -205,9 +205,7 @@ def test_an_identical_call_changes_nothing(folder, store):
     reporting = RECIPE.changed(log_every=2, checkpoint_every=7)
     planar = InternalEngine(SIMULATORS["planar"], pushes="AAAAAAAA")
     for recipe, engine in ((RECIPE, "planar"), (reporting, planar)):
-        fit_ensemble(
-            folder.name, store, recipe, folder, members=MEMBERS, assumed_engine=engine
-        )
+        fit_ensemble(folder.name, store, recipe, folder, members=MEMBERS, engine=engine)
     assert {p: p.stat().st_mtime_ns for p in folder.rglob("*") if p.is_file()} == before
 
 

@@ -265,7 +265,7 @@ def test_sain_learns_around_an_identified_engine(store, start, tmp_path):
     """Its prediction is computed, because the store has none; the card is complete."""
     values = {"pusher_friction": 0.2, "pressure_radius_ratio": 0.5, "camera_x_mm": 1.5}
     internal = identified_folder(tmp_path / "engine", **values)
-    words = {"assumed_engine": str(tmp_path / "engine")}
+    words = {"engine": str(tmp_path / "engine")}
     out = tmp_path / "out"
     fit(
         "sain",

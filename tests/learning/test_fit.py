@@ -243,10 +243,10 @@ def test_a_loss_of_nan_stops_the_training(store, tmp_path, monkeypatch):
     assert not (tmp_path / "out" / CARD).exists()
 
 
-def test_data_without_the_assumed_engine_are_refused(store, tmp_path):
+def test_data_without_the_internal_engine_are_refused(store, tmp_path):
     says = "no simulator prediction of bullet; use planar, or the folder"
     with pytest.raises(BadStore, match=says):
-        fit("sain", store, CONFIG, tmp_path / "out", assumed_engine="bullet")
+        fit("sain", store, CONFIG, tmp_path / "out", engine="bullet")
     assert not (tmp_path / "out").exists()
 
 
@@ -255,7 +255,7 @@ def test_a_prediction_that_the_data_lack_is_computed(store, tmp_path):
     stores = generate(both, tmp_path / "both"), store
     recipe = CONFIG.changed(iterations=5)
     trained = [
-        fit("sain", each, recipe, tmp_path / name, assumed_engine="planar-overlap")
+        fit("sain", each, recipe, tmp_path / name, engine="planar-overlap")
         for name, each in zip(("stored", "computed"), stores, strict=True)
     ]
     networks = (load_network(each.folder)[0] for each in trained)

@@ -143,15 +143,15 @@ def test_recorded_and_force_driven_pushes_are_refused(store, tmp_path):
 
 @pytest.fixture(scope="module")
 def around_bullet(tmp_path_factory):
-    info = info_of(10, assumed_engines=("bullet",))
+    info = info_of(10, engines=("bullet",))
     arrays = made_up(info)
     arrays["simulated_bullet"] = arrays.pop("simulated_planar")
     return write(tmp_path_factory.mktemp("bullet") / "data", info, arrays)
 
 
 def test_bullet_cannot_restart_in_a_training(around_bullet, tmp_path):
-    with pytest.raises(BadInput, match="`assumed_engine` is bullet"):
-        fit("sain", around_bullet, CONFIG, tmp_path / "out", assumed_engine="bullet")
+    with pytest.raises(BadInput, match="`engine` is bullet"):
+        fit("sain", around_bullet, CONFIG, tmp_path / "out", engine="bullet")
 
 
 def test_in_needs_no_restarting_engine(around_bullet):

@@ -139,7 +139,7 @@ def tune(
                 store_of(pushes),
                 settings,
                 Path(folder),
-                assumed_engine=_internal(engine or "planar"),
+                engine=_internal(engine or "planar"),
                 on_step=reported(advance),
             )
         found = load(folder)

@@ -66,7 +66,7 @@ class Training:
                     stores,
                     recipe,
                     self.out,
-                    assumed_engine=engine,
+                    engine=engine,
                     on_step=reported(advance),
                 )
             curve = draw_history(model, result.history, self.out / "learning-curve.svg")
@@ -81,7 +81,7 @@ class Training:
                 recipe,
                 self.out,
                 members=self.members,
-                assumed_engine=engine,
+                engine=engine,
                 on_step=reported(advance),
             )
         output.say(f"The ensemble is in {self.out}")
@@ -97,7 +97,7 @@ class Train(Training):
 
     model: Positional[ModelKind]
     """Network: in (without an engine) or sain (around an engine)."""
-    assumed_engine: str = "planar"
+    engine: str = "planar"
     """Internal engine of SAIN: planar, planar-overlap, another simulator whose
     prediction the dataset contains, or the folder of identified parameters ('sainet
     identify')."""
@@ -112,7 +112,7 @@ class Train(Training):
         recipe = self.recipe
         if self.single_steps:
             recipe = recipe.changed(horizon=SingleSteps(steps=recipe.horizon.steps))
-        return self.fit(self.model, self.assumed_engine, recipe, self.output)
+        return self.fit(self.model, self.engine, recipe, self.output)
 
 
 def only(given: Sequence[T]) -> T:

@@ -183,7 +183,7 @@ def _check_single_steps(task: Task) -> None:
         )
     if task.inner and task.inner.simulator.build().on_host:
         raise BadInput(
-            f"`assumed_engine` is {task.inner.simulator.slug}, which cannot restart at "
+            f"`engine` is {task.inner.simulator.slug}, which cannot restart at "
             "every step of a training; use planar, or train on whole pushes."
         )
 

@@ -46,7 +46,7 @@ def fit_ensemble(
     out: Path,
     *,
     members: int,
-    assumed_engine: str | InternalEngine = "planar",
+    engine: str | InternalEngine = "planar",
     on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
 ) -> float | None:
     """Train networks of consecutive seeds, then calibrate the regions of their mean.
@@ -60,7 +60,7 @@ def fit_ensemble(
         recipe: of each member; the first has its seed.
         out: run folder, with a folder for each member.
         members: number of networks.
-        assumed_engine: see `fit`.
+        engine: see `fit`.
         on_step: called with the iterations of all members so far, and the last loss.
 
     Returns:
@@ -80,13 +80,13 @@ def fit_ensemble(
     require_seed(recipe.seed + members - 1)  # of the last member
     rest, held = divided(store, recipe.seed)
     training = store.take(np.sort(rest))
-    settings = prepared(model, training, recipe, assumed_engine).settings()
+    settings = prepared(model, training, recipe, engine).settings()
     config = settings | {"data": store.content, "members": members}
     folder = open_run(out, config, finished_by=ENSEMBLE)
 
     def job(number: int) -> Job | None:
         own, place = recipe.changed(seed=recipe.seed + number), member(out, number)
-        return begin(model, training, own, place, assumed_engine=assumed_engine)
+        return begin(model, training, own, place, engine=engine)
 
     _train(job, members, on_step)
     logs = [read_log(member(out, number)) for number in range(members)]

@@ -38,7 +38,7 @@ def fit(
     recipe: Recipe,
     out: Path,
     *,
-    assumed_engine: str | InternalEngine = "planar",
+    engine: str | InternalEngine = "planar",
     on_step: Callable[[int, float | None], None] = lambda iteration, loss: None,
 ) -> FitResult:
     """Train a network, or resume an interrupted training run.
@@ -50,7 +50,7 @@ def fit(
         recipe: with the start of training; `recipe_for` returns the one that fits a
             start.
         out: the run folder.
-        assumed_engine: internal engine of SAIN: its name in the store, or the folder of
+        engine: internal engine of SAIN: its name in the store, or the folder of
             identified parameters, whose prediction is then computed; or the engine.
         on_step: called with the number of finished iterations and the last logged loss,
             None before the first.
@@ -63,7 +63,7 @@ def fit(
         BadCheckpoint: training cannot start from that network.
         Diverged: the loss became NaN or infinite.
     """
-    job = begin(model, store, recipe, out, assumed_engine=assumed_engine)
+    job = begin(model, store, recipe, out, engine=engine)
     if job is None:
         _log.info("%s is already finished", out)
         return FitResult(out, read_log(out))

@@ -138,14 +138,14 @@ def begin(
     recipe: Recipe,
     out: Path,
     *,
-    assumed_engine: str | InternalEngine = "planar",
+    engine: str | InternalEngine = "planar",
 ) -> Job | None:
     """Return a training run, at its start or where it was interrupted; see `fit`.
 
     Returns:
         None if it is finished.
     """
-    mixture = prepared(model, store, recipe, assumed_engine)
+    mixture = prepared(model, store, recipe, engine)
     devices = jax.device_count()
     folder = open_run(out, mixture.settings(), finished_by=CARD, devices=devices)
     if folder.is_finished:
@@ -169,13 +169,13 @@ def prepared(
     model: ModelKind,
     store: Store | Sequence[Store],
     recipe: Recipe,
-    assumed_engine: str | InternalEngine,
+    engine: str | InternalEngine,
 ) -> Mixture:
     """Return what a training run takes, checked; see `fit`."""
     stores = (store,) if isinstance(store, Store) else tuple(store)
     if not stores:
         raise BadInput("`data` is empty; give at least one dataset.")
-    assumed = find_internal_engine(assumed_engine)
+    assumed = find_internal_engine(engine)
     pushes = sum(each.info.pushes for each in stores)
     recipe = replace(recipe, objective=recipe.objective.for_pushes(pushes))
     existing = _existing(recipe.start)

@@ -105,7 +105,7 @@ class NetworkCandidate(Candidate):
             store,
             self.recipe(store.info.pushes),
             folder,
-            assumed_engine=internal if is_around else "planar",
+            engine=internal if is_around else "planar",
         )
 
     def recipe(self, pushes: int) -> Recipe:
@@ -129,9 +129,7 @@ class EnsembleCandidate(NetworkCandidate):
     def fit(self, store: Store, internal: InternalEngine, folder: Path) -> None:
         """Train the networks and calibrate them."""
         recipe = self.recipe(store.info.pushes)
-        fit_ensemble(
-            "sain", store, recipe, folder, members=MEMBERS, assumed_engine=internal
-        )
+        fit_ensemble("sain", store, recipe, folder, members=MEMBERS, engine=internal)
 
 
 ADDITIVE = Variant("sain", "residual", "identified")

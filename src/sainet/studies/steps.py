@@ -249,7 +249,7 @@ class Train(Apart[Model]):
             self.stores(runner),
             self.recipe_in(runner),
             runner.folder(self),
-            assumed_engine=engine,
+            engine=engine,
         )
 
     def run(self, runner: "Runner") -> Model:
