@@ -143,7 +143,7 @@ def test_recorded_and_force_driven_pushes_are_refused(store, tmp_path):
 
 @pytest.fixture(scope="module")
 def around_bullet(tmp_path_factory):
-    info = info_of(10, engines=("bullet",))
+    info = info_of(10, assumed_engines=("bullet",))
     arrays = made_up(info)
     arrays["simulated_bullet"] = arrays.pop("simulated_planar")
     return write(tmp_path_factory.mktemp("bullet") / "data", info, arrays)
