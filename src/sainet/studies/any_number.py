@@ -208,7 +208,7 @@ ASSUMED_STUDY = Study(
     question="How much of the error of an engine with assumed properties does a "
     "contact network remove, with two disks and with more?",
     plan=_assumed,
-    subject=ASSUMED.slug,
+    subject=structs.replace(OVERLAP, variant=MIXED.variant).slug,
 )
 GAPS = Study(
     question="How do errors depend on the gap between two disks at the start?",
