@@ -58,8 +58,7 @@ def progress_bar(
         TimeRemainingColumn(elapsed_when_finished=True),
         TextColumn("{task.fields[note]}", markup=False),
     )
-    bar = Progress(*columns, console=Console(stderr=True), disable=quiet)
-    pace = Pace()
+    pace, bar = Pace(), Progress(*columns, console=Console(stderr=True), disable=quiet)
     with bar:
         task = bar.add_task(title, total=None, note=waiting, rate="")
 
