@@ -102,7 +102,7 @@ def starting_values(
     return {name: known[name] for name in names}
 
 
-def _mean(parts: Sequence[Float[Array, " push"]]) -> float:
+def _mean(parts: Sequence[Float[Array, " _"]]) -> float:
     # The rounding of a single-precision mean depends on the number of values. The mean
     # of equal values must not: it is the first value.
     first, every = np.float64(parts[0]), np.float64(np.concatenate(parts))
