@@ -139,6 +139,12 @@ def test_datasets_that_do_not_belong_together_are_refused(stores, tmp_path):
     other = write(tmp_path / "slow", info, made_up(info))
     with pytest.raises(BadStore, match="slow: time_step is 0.01"):
         fit("sain", [stores[1], other], RECIPE, tmp_path / "out")
+    info = info_of(6, bodies=3, assumed_engines=("bullet",))
+    arrays = made_up(info)
+    arrays["simulated_bullet"] = arrays.pop("simulated_planar")
+    around = write(tmp_path / "around", info, arrays)
+    with pytest.raises(BadStore, match="of-2: no simulator prediction of bullet"):
+        fit("sain", [around, stores[1]], RECIPE, tmp_path / "out", engine="bullet")
     with pytest.raises(BadStore, match="[0-9]+ of its pushes are in .*, too"):
         fit("sain", [stores[0], stores[1], stores[0]], RECIPE, tmp_path / "out")
     with pytest.raises(BadInput, match="`data` is empty"):

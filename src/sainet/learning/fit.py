@@ -50,7 +50,7 @@ def fit(
         recipe: with the start of training; `recipe_for` returns the one that fits a
             start.
         out: the run folder.
-        engine: internal engine of SAIN: its name in the store, or the folder of
+        engine: internal engine of SAIN: the name of a simulator, or the folder of
             identified parameters, whose prediction is then computed; or the engine.
         on_step: called with the number of finished iterations and the last logged loss,
             None before the first.
