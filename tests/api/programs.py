@@ -3,7 +3,7 @@
 PREDICT = """
 import sainet as sn
 
-model = sn.load("sain")  # predict; or a folder: "runs/sain"
+model = sn.load("sain")  # or a folder: "runs/sain"
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
 trajectory = model.predict(scene, scene.in_a_row(), sn.Push(contact_angle=0.2))
 print(trajectory.final.position)  # m, [disk, 2]
