@@ -104,6 +104,15 @@ EXTRAS = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"][
 ]
 
 
+def test_links_of_contributing_lead_to_pages_of_the_site(monkeypatch):
+    monkeypatch.syspath_prepend(REPOSITORY / "docs")
+    from site_pages.reference import project_file
+
+    links = re.findall(r"\]\((?!http)([^)#]+)", project_file("CONTRIBUTING.md"))
+    assert links
+    assert [link for link in links if not (REPOSITORY / "docs" / link).exists()] == []
+
+
 def test_documented_extras_exist():
     found = set()
     for page in PAGES:

@@ -32,8 +32,9 @@ _HOMES = {
 
 
 def project_file(name: str) -> str:
-    """Return the text of a file of the project below its title."""
-    return (ROOT / name).read_text("utf-8").partition("\n")[2]
+    """Return the text of a file of the project below its title, for a page in docs/."""
+    text = (ROOT / name).read_text("utf-8").partition("\n")[2]
+    return text.replace("](docs/", "](")
 
 
 def public_homes() -> dict[str, str]:
