@@ -90,6 +90,12 @@ def test_every_option_shows_one_default_or_is_required_or_a_switch(shown):
         assert stated == 1 or (stated == 0 and switch), option
 
 
+def test_a_sentence_ends_before_its_default(shown):
+    for option in options(shown):
+        text, stated, _ = option.partition(" (default: ")
+        assert not stated or text.endswith("."), option
+
+
 def test_brackets_are_closed_before_a_default(shown):
     for option in options(shown):
         before = option.partition("(default: ")[0]

@@ -47,7 +47,7 @@ class CrossValidate:
     and the inputs up to these, are chosen in each fold (side takes six times as long,
     place nine). ensemble: the mean of five networks, with 90 % regions."""
     group: str | None = None
-    """Group of pushes to use, or surface (default: all groups)."""
+    """Group of the pushes, or their surface (default: all groups)."""
     pushes: int | None = None
     """Pushes to use, from the start of the dataset (default: all)."""
     table: Path | None = None

@@ -68,7 +68,7 @@ class Import:
 
     format: Positional[Literal["mitpush-endpoints", "mitpush", "table"]]
     """mitpush-endpoints: poses before and after pushes of the MIT Push dataset.
-    mitpush: raw MIT Push dataset, poses during each push of its disk.
+    mitpush: raw MIT Push dataset, poses during each push of the disk ellip1.
     table: own pushes, one row for each push, time and body."""
     path: Annotated[Positional[Path], arg(metavar="PATH")]
     """mitpush-endpoints: the CSV, its folder, or a .mat log of the authors.
@@ -77,14 +77,15 @@ class Import:
     out: Path
     """Run folder; identical settings resume."""
     properties: Path | None = None
-    """TOML file of masses (kg), radii (m) and frictions, for the format table only.
+    """TOML file of masses (kg), radii (m) and frictions, only for the format table.
     Default: none."""
     contact_friction: float | None = None
     """Friction between pusher and disk, and between disks. Default: that of the
-    properties of a table, else 0.25, from a sweep on pushes of the MIT Push dataset."""
+    properties of a table, else 0.25, published for the robot of the MIT Push dataset.
+    """
     units: Units = field(default_factory=Units)
     skip_bad: bool = False
-    """Leave out pushes of a table with a problem; print how many and why."""
+    """Leave out the pushes of a table that have a problem; print how many and why."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:

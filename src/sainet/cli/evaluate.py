@@ -35,7 +35,7 @@ class Evaluate:
     data: Path
     """Dataset of pushes to predict."""
     group: str | None = None
-    """Group of pushes to predict, or surface (default: all groups)."""
+    """Group of the pushes, or their surface (default: all groups)."""
     steps: int | None = None
     """Number of steps to predict; 0 for all. Default: 200; all for recorded pushes."""
     engine: str | None = None

@@ -22,7 +22,7 @@ from tyro.constructors import (
 from sainet.runs.errors import SainetError, shown
 
 # A text states the default that its value, None or empty, does not show.
-_DEFAULT = re.compile(r"[\s(]*[Dd]efault: (?P<value>.+?)\)?\.$")
+_DEFAULT = re.compile(r"\.?[\s(]*[Dd]efault: (?P<value>.+?)\)?\.$")
 
 
 def option_registry() -> ConstructorRegistry:
@@ -65,7 +65,7 @@ def _option(field: Field[Any], kind: Any, text: str, owner: object) -> StructFie
         name=field.name,
         type=kind,
         default=value,
-        helptext=_DEFAULT.sub("", text) or None,
+        helptext=_DEFAULT.sub(".", text) or None,
     )
 
 

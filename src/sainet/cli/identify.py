@@ -13,11 +13,12 @@ class Identify:
     """Estimate the planar engine's parameters and the camera offset from pushes."""
 
     data: Path
-    """Dataset of path-controlled pushes with measured poses, at least at both ends."""
+    """Dataset of recorded pushes or of the robot setup; poses before and after each
+    push are enough."""
     out: Path
     """Run folder to write, usable as a model."""
     group: str | None = None
-    """Group of pushes to use, for example abs-10, or surface (default: all)."""
+    """Group of the pushes, for example abs-10, or their surface (default: all)."""
     pushes: int | None = None
     """Pushes to use, from the start of the dataset (default: all)."""
     output: Output = field(default_factory=Output)

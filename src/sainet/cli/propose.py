@@ -22,8 +22,8 @@ class Propose:
     count: int = 10
     """Number of pushes to propose."""
     pool: Path | None = None
-    """Dataset of possible pushes. Without it, pushes of one disk are drawn from the
-    whole range of the training pushes (default: none)."""
+    """Dataset of possible pushes (default: for one disk, pushes drawn from the whole
+    range of the training pushes)."""
     output: Output = field(default_factory=Output)
 
     def run(self) -> Json:

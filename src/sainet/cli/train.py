@@ -26,7 +26,7 @@ class Training:
     out: Path
     """Run folder; identical settings resume."""
     group: str | None = None
-    """Group of pushes to train on, or surface (default: all groups)."""
+    """Group of the pushes, or their surface (default: all groups)."""
     pushes: int | None = None
     """Pushes to train on, from the start of the dataset (default: all)."""
     members: int | None = None

@@ -59,7 +59,7 @@ class Objective:
     l2: float | None = 1e-6
     """Weight of the squared weights in the loss, or of their squared changes from a
     network or the engine at the start. (The paper's 1e-3 is for a loss in metres; this
-    loss is scaled.) None: 1 / pushes, with which few pushes change little."""
+    loss is scaled.) None: 1 / pushes; few pushes then change the network little."""
     weight_position: float = 1.0
     """Weight of positions in the scaled loss."""
     weight_rotation: float = 1.0
@@ -102,7 +102,7 @@ class WholePush:
     """Steps of each push to train on."""
     hold: int = 1
     """Zero-order-hold length for additive networks (steps): training computes their
-    output once and reuses it. Predictions hold only that of contact networks."""
+    output once and reuses it. Only contact networks hold it in predictions, too."""
     short_iterations: int = 0
     """Number of first iterations in which pushes end after a quarter of the steps."""
 

@@ -47,15 +47,15 @@ class RobotConfig:
     noise_level: NoiseLevel = "default"
     """Scale of the world's noise; paper-like is three times the default."""
     lab: int = 0
-    """Number of the virtual lab, whose hidden properties are drawn from it; the studies
-    use labs 0 to 4."""
+    """Number of the virtual lab, the seed of its hidden properties; the studies use
+    labs 0 to 4."""
     surface: Surface = "abs"
     """Surface of the virtual lab: abs or plywood."""
     swapped: bool = False
     """Exchange the two disks of the virtual lab, so that the larger one is pushed."""
     area_mm: float = 300.0
     """Side of the square around the table's origin in which the centres of the disks
-    are arranged (mm), at least as long as their row; for control, of lab and abb."""
+    are arranged (mm), at least as long as their row; in control: for lab and abb."""
     config: Path | None = None
     """Configuration of the cell of the physical robot (TOML). Default: none."""
     # Not part of any run: nothing is recorded.

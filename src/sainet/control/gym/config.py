@@ -31,7 +31,7 @@ class PushDisksConfig(TableConfig):
     pushes: int = 60
     """Number of pushes after which an episode is truncated."""
     lab: int = 0
-    """Number of the virtual lab, whose hidden properties are drawn from it."""
+    """Number of the virtual lab, the seed of its hidden properties."""
     surface: Surface = "abs"
     """Surface of the virtual lab: abs or plywood."""
     given_properties: GivenProperties = "true"
