@@ -77,8 +77,8 @@ def _in_lab(lab: int, count: int, pushes: int, before: int) -> Iterator[RunTrial
 
 
 STUDY = Study(
-    question="With wrong masses and radii, what does adaptation during an episode win "
-    "back?",
+    question="With wrong masses and radii, how many more goals are solved if the model "
+    "adapts during an episode?",
     plan=_plan,
 )
 NEW_SURFACE_STUDY = Study(

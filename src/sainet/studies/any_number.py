@@ -198,7 +198,7 @@ def _claims() -> Iterator[Claim]:
 
 
 NUMBERS = Study(
-    question="Do networks that were trained on few disks predict pushes of more?",
+    question="Do networks trained on few disks predict pushes of more disks?",
     plan=_numbers,
     subject=TRUE_PROPERTIES,
     claims=tuple(_claims()),

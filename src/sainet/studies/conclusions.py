@@ -88,7 +88,7 @@ CLAIMS = (
         errs_less(_PLANAR, "sain-single-steps"),
     ),
     PaperClaim(
-        "an object-based network errs less than a feedforward one",
+        "an object-based network errs less than a feedforward network",
         "section II-A",
         "feedforward",
         errs_less(_BULLET, "sain-bullet-whole-state", condition="2 disks"),
@@ -107,7 +107,7 @@ CLAIMS = (
         solves_more(_PLANAR, "physics-true", "hard, greedy"),
     ),
     PaperClaim(
-        "fine-tuning on real pushes lowers the errors of SAIN",
+        "fine-tuning on pushes of the robot lowers the errors of SAIN",
         "Table IV",
         "lab-prediction",
         errs_less(_TUNED, _PLANAR, condition=TESTS),
@@ -170,7 +170,7 @@ CLAIMS = (
         reason="the engines and networks here predict disks only",
     ),
     PaperClaim(
-        "all of this on a real robot with two disks",
+        "all of this on a physical robot with two disks",
         "section IV-F",
         reason="no recordings of two disks are published, and there is no robot here",
     ),

@@ -1,4 +1,4 @@
-"""Control among more disks: longer rows; another target disk, and obstacles.
+"""Control with more disks: longer rows; another target disk, and obstacles.
 
 Bullet with noise is the world, and the tree search plans. All models face the same
 goals, tables and noise. SAIN solves few goals of rows and uses all its pushes on the
@@ -70,8 +70,8 @@ def _trials(
 # Declared before rows were steered. No claim concerns the adapted trials, which were
 # added when the results of the others were known.
 STUDY = Study(
-    question="Which model pushes rows of more disks to goals, and how long may a row "
-    "be?",
+    question="Which model pushes rows of three and more disks to goals, and how long "
+    "may a row be?",
     plan=_rows,
     claims=(
         Claim(

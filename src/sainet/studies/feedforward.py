@@ -1,4 +1,4 @@
-"""Feedforward networks on the whole state beside object-based ones.
+"""Feedforward networks on the whole state, compared with object-based networks.
 
 A feedforward network takes only as many disks as it was trained on: one of two disks
 cannot predict three, and three disks need networks of their own.

@@ -169,8 +169,8 @@ def errs_at_most(
 
 # Declared before any model was measured in a lab.
 STUDY = Study(
-    question="Table IV in the virtual lab: how much does fine-tuning on its pushes "
-    "lower the errors?",
+    question="Table IV in the virtual lab: how much does fine-tuning on pushes of the "
+    "lab lower the errors?",
     plan=_plan,
     needs=(MUJOCO,),
     published=PUBLISHED_REAL,

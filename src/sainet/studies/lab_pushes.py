@@ -207,7 +207,7 @@ def condition_of(label: str, **factors: float | str) -> Condition:
 
 
 STUDY = Study(
-    question="Virtual lab: how does physics err on the pushes that its robot collects?",
+    question="Virtual lab: what are the errors of physics on the collected pushes?",
     plan=_plan,
     needs=(MUJOCO,),
     figure=draw_errors,

@@ -182,7 +182,7 @@ NOISE_STUDY = Study(
     ),
 )
 WEAK_DAMPER_STUDY = Study(
-    question="Do networks have the published errors where Physics has?",
+    question="Do networks have the published errors in a setting where Physics does?",
     plan=_weak_damper,
     claims=sain_errs_less((LETTER, USUAL)),
     published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,

@@ -101,14 +101,14 @@ _CLAIMS = (
     PUBLISHED_ORDER,
 )
 DIRECT_FORCE_TWO_DISKS = Study(
-    question="Table I: does a network around an engine err less than either, on "
-    "pushes of two disks by a force?",
+    question="Table I: on pushes of two disks by a force, does a network around an "
+    "engine err less than the engine and than a network without one?",
     plan=lambda scope: _two_disks("direct-force", scope),
     claims=_CLAIMS,
     published=PUBLISHED_DIRECT_FORCE_TWO_DISKS,
 )
 DIRECT_FORCE_THREE_DISKS = Study(
-    question="Table II: do networks trained on two disks predict three?",
+    question="Table II: do networks trained on two disks predict pushes of three?",
     plan=_three_disks,
     claims=_CLAIMS,
     published=PUBLISHED_DIRECT_FORCE_THREE_DISKS,
@@ -120,7 +120,8 @@ ROBOT_TWO_DISKS = Study(
     published=PUBLISHED_ROBOT_TWO_DISKS,
 )
 ROBOT_PLANAR = Study(
-    question="Table III with the planar engine as truth, on the base installation?",
+    question="Table III with the planar engine as ground truth: are the results the "
+    "same without Bullet?",
     plan=_planar,
     needs=(),
     claims=(PUBLISHED_ORDER,),

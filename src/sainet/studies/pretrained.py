@@ -74,5 +74,6 @@ def _long_pushes(count: int, seed: int) -> GenerateConfig:
 
 
 STUDY = Study(
-    question="Which networks ship with the package, and how do they err?", plan=_plan
+    question="Which networks ship with the package, and what are their errors?",
+    plan=_plan,
 )

@@ -75,8 +75,8 @@ VARIED_OR_FIXED = Study(
     claims=_trained_on(VARIED, FIXED) + _trained_on(FIXED, VARIED),
 )
 CROSSED = Study(
-    question="Which true properties reduce errors: those of the internal engine, or "
-    "those that the network is given?",
+    question="Where do true properties reduce errors: in the internal engine, or as "
+    "inputs of the network?",
     plan=_crossed,
     claims=(
         *(

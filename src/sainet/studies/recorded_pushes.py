@@ -172,7 +172,7 @@ def _few(store: Store, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 STUDY = Study(
     question="On recorded pushes, is identifying the engine enough, or does learning "
-    "err less?",
+    "lower the errors further?",
     plan=_plan,
     claims=(
         Claim(

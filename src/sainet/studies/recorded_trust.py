@@ -148,7 +148,7 @@ STUDY = Study(
     needs=(RECORDED,),
 )
 CHOSEN_STUDY = Study(
-    question="On recorded pushes, how well does a Gaussian process predict whose "
+    question="On recorded pushes, how well does a Gaussian process predict if its "
     "inputs and kernel are chosen without the test pushes?",
     plan=_chosen,
     subject=PHYSICS_IDENTIFIED.slug,
