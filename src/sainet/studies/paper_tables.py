@@ -120,8 +120,7 @@ ROBOT_TWO_DISKS = Study(
     published=PUBLISHED_ROBOT_TWO_DISKS,
 )
 ROBOT_PLANAR = Study(
-    question="Table III with the planar engine as ground truth: are the results the "
-    "same without Bullet?",
+    question="Table III with the planar engine: are the results the same?",
     plan=_planar,
     needs=(),
     claims=(PUBLISHED_ORDER,),

@@ -74,6 +74,5 @@ def _long_pushes(count: int, seed: int) -> GenerateConfig:
 
 
 STUDY = Study(
-    question="Which networks ship with the package, and what are their errors?",
-    plan=_plan,
+    question="How accurate are the networks that ship with the package?", plan=_plan
 )
