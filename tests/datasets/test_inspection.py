@@ -170,6 +170,27 @@ def test_a_push_that_contradicts_physics_is_named(tmp_path: Path, reason: str):
     assert [text in doubt.text for doubt in doubts if doubt.reason == reason] == [True]
 
 
+def pushes_beside_the_centre(sense: np.ndarray) -> dict[str, np.ndarray]:
+    """Pushes that pass the centre on the right, and turn the disk by 6 degrees."""
+    arrays = frictionless_line()
+    for name in ("initial_pusher", "truth_pusher", "command_position"):
+        arrays[name][..., 1] -= 0.01
+    turned = np.linspace(0, np.deg2rad(6), STEPS)
+    arrays["truth"][..., 0, 2] = sense[:, None] * turned
+    return arrays
+
+
+@pytest.mark.parametrize(("wrong", "named"), [(PUSHES, PUSHES), (10, 10), (9, 0)])
+def test_clockwise_angles_are_doubtful(tmp_path: Path, wrong: int, named: int):
+    """Single pushes may turn a disk the other way, for example at other disks."""
+    sense = np.where(np.arange(PUSHES) < wrong, -1.0, 1.0)
+    store = stored(tmp_path / "data", pushes_beside_the_centre(sense))
+    doubts = find_doubts(store, facts_of(store))
+    assert [doubt.row for doubt in doubts] == [*range(named)]
+    assert all(doubt.reason == "turned the other way" for doubt in doubts)
+    assert all("turns by -6.0 degrees" in doubt.text for doubt in doubts)
+
+
 @pytest.mark.parametrize(
     "settings", [{}, {"disks": 3}, {"setup": "direct-force"}, {"noise_level": "none"}]
 )

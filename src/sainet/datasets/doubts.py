@@ -20,6 +20,7 @@ NEAR = 0.005  # m: a pusher farther away moves no disk
 STILL = 0.002  # m
 SLACK = 0.003  # m, of the bounds on travel and rotation
 _LEAST_FRICTION = 0.05
+_FEW = 3  # pushes
 _TEXTS = {
     "duplicate": "starts and is commanded as push {}; keep one of them",
     "no known pose": "no pose after the start is known; no model can learn from it",
@@ -38,6 +39,8 @@ _TEXTS = {
     "and names",
     "turned too far": "a rim turns by {:.1f} mm, pusher and disks move by {:.1f} mm; "
     "check angles",
+    "turned the other way": "a disk turns by {:.1f} degrees, against its push like "
+    "most disks; check the signs of x, y and the angles (counter-clockwise)",
 }
 _Rule = tuple[str, Bool[np.ndarray, " push"], tuple[np.ndarray, ...]]
 
@@ -108,3 +111,19 @@ def _of_motion(facts: Facts) -> Iterator[_Rule]:
     driven = moved * (2 * facts.moved.shape[1] - 1)  # disks drive disks
     values = 1e3 * rim, 1e3 * (facts.path_length + moved)
     yield "turned too far", rim > most + driven + SLACK, values
+    yield from _of_sense(facts)
+
+
+def _of_sense(facts: Facts) -> Iterator[_Rule]:
+    """Yield pushes that turn a disk against the side on which the pusher passes it.
+
+    A disk that touches others may do so. If most disks do, an axis is reversed.
+    """
+    far = np.linalg.norm(facts.start[..., :2] - facts.path[:, :1], axis=-1)
+    pushed = np.arange(len(far)), np.argmin(far - facts.radius, axis=1)
+    turned = (facts.end - facts.start)[..., 2][pushed]
+    side = far[pushed] * np.sin(facts.direction)  # of the path, from the centre
+    clear = (np.abs(turned) * facts.radius[pushed] > SLACK) & (np.abs(side) > NEAR)
+    against = clear & (turned * side > 0)
+    are_most = against.sum() > max(3 * (clear & ~against).sum(), _FEW)
+    yield "turned the other way", against & are_most, (np.rad2deg(turned),)
