@@ -62,8 +62,10 @@ def arrays_of(folder: Path) -> dict[str, np.ndarray]:
 def test_every_bad_push_is_reported_at_once(tmp_path: Path):
     with pytest.raises(BadTable) as caught:
         import_table(*write(tmp_path, to_csv(mixed())), tmp_path / "out")
-    lines = caught.value.problems
+    *lines, last = caught.value.problems
     assert len(lines) == len(BAD)
+    good = f"{len(BAD) + 1} have no problem."
+    assert last == f"Give `skip_bad` to leave bad pushes out; {good}"
     text = "\n".join(lines)
     wanted = ["y is 'nan'", "angle is 'left'", "body is empty", "x is 1e+06 (in mi"]
     wanted += ["angle is 99 (in deg", "the body jumps", "sort the times"]
@@ -81,7 +83,7 @@ def test_rows_of_one_kind_are_listed_and_the_rest_counted(tmp_path: Path):
     table += BAD["jumps"]
     with pytest.raises(BadTable) as caught:
         import_table(*write(tmp_path, to_csv(table)), tmp_path / "out")
-    lines = caught.value.problems
+    *lines, _ = caught.value.problems
     assert len(lines) == MOST_PROBLEMS + 1
     assert lines[-1] == "and 11 more problems."
     # The first of each kind comes first, so that none is hidden behind many others.
@@ -127,7 +129,8 @@ def test_an_empty_text_costs_only_its_push_in_parquet_too(tmp_path, column, empt
     _, bodies = write(tmp_path, "")
     path = tmp_path / "pushes.parquet"
     path.write_bytes(to_parquet(table, header))
-    says = f"^{path}: row {len(table) - 2}: {column} is empty; write its name.$"
+    says = f"^{path}: row {len(table) - 2}: {column} is empty; write its name."
+    says += r"(\nGive `skip_bad` .*)?$"
     for skip in (False, True) if column == "push" else (False,):
         with pytest.raises(BadTable, match=says):
             import_table(path, bodies, tmp_path / "out", skip_bad=skip)
@@ -226,7 +229,9 @@ def test_the_command_counts_what_it_left_out(tmp_path: Path, capfd):
     text = path.read_text().replace("b,0.0,far", "b,soon,far")
     path.write_text(text)
     assert run(words) == 2
-    assert "time is 'soon'" in capfd.readouterr().err
+    text = capfd.readouterr().err
+    assert "time is 'soon'" in text
+    assert "Give --skip-bad to leave bad pushes out; 1 have no problem." in text
     for _ in range(2):
         assert run([*words, "--skip-bad"]) == 0
         found = json.loads(capfd.readouterr().out)

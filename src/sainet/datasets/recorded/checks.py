@@ -132,10 +132,10 @@ def _jumps(
     for body, track in enumerate((*bodies, pusher)):
         what = "the body" if body < len(bodies) else "the pusher"
         of = min(body, len(bodies) - 1)
-        yield from _jump(track.time, distances(track), _MOVE, (what, of))
+        yield from _jump(track.time, distances(track), _MOVE, (what, of, "m"))
     for body, track in enumerate(bodies):
         turned = np.abs(np.diff(track.value[:, 2]))
-        yield from _jump(track.time, turned, _TURN, ("the angle", body))
+        yield from _jump(track.time, turned, _TURN, ("the angle", body, "rad"))
 
 
 def distances(track: Track) -> Float[np.ndarray, " step"]:
@@ -147,13 +147,15 @@ def _jump(
     time: Float[np.ndarray, " sample"],
     moved: Float[np.ndarray, " step"],
     allowed: float,
-    of: tuple[str, int],
+    of: tuple[str, int, str],
 ) -> Iterator[Problem]:
     """Yield the first jump, if any; samples further apart than 4 ms may move more."""
-    jump = _first(moved > allowed * np.maximum(np.diff(time) / _SPACING, 1))
+    passed = np.diff(time)
+    jump = _first(moved > allowed * np.maximum(passed / _SPACING, 1))
     if jump is not None:
-        what, body = of
-        text = f"{what} jumps from the sample before; repair it or remove the push"
+        what, body, unit = of
+        by = f"{moved[jump - 1]:.3g} {unit} in {passed[jump - 1]:.3g} s"
+        text = f"{what} jumps by {by}; repair it or remove the push"
         yield Problem(f"{what} jumps", text, sample=jump, body=body)
 
 

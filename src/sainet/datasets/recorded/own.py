@@ -22,6 +22,7 @@ _log = logging.getLogger(__name__)
 _PLACES = ("x", "y", "pusher_x", "pusher_y")
 _PLACE = replace(checks.PLACE, remedy="in another unit, give `length_unit`")
 _ANGLE = replace(checks.ANGLE, remedy="in another unit, give `angle_unit`")
+_COMPLETE = "add its row, or remove all rows of that time"
 _SAME_PLACE = 1e-6  # m
 COLUMNS = tables.Columns(
     texts=("push", "body"),
@@ -67,14 +68,15 @@ def import_table(
     known = read_properties(Path(properties), contact_friction, problems)
     bodies = _present(table, known, Path(properties), problems)
     recordings = list(_recordings(table, bodies, problems)) if bodies else []
-    problems.raise_any(skip_bad=skip_bad and len(recordings) > 0)
+    good = len(recordings)
+    problems.raise_any(skip_bad=skip_bad and good > 0, good=good)
     assert bodies is not None
     settings = {"command": "import table", "source": path.name}
     settings |= {"source_sha256": content_hash(data)} | units.settings
     if skip_bad:
         count = len(table.texts["push"].names)
-        settings |= {"skip_bad": True, "left_out": count - len(recordings)}
-        problems.warn(path, count - len(recordings), count)
+        settings |= {"skip_bad": True, "left_out": count - good}
+        problems.warn(path, count - good, count)
     return import_pushes(out, settings, [*map(resample, recordings)], bodies)
 
 
@@ -218,11 +220,11 @@ class _Push:
         missing, added = ~np.isin(wanted, time), ~np.isin(time, wanted)
         if missing.any():
             at = int(np.argmax(missing))
-            text = f"{named} is missing at time {wanted[at]:.12g}; add its row"
+            text = f"{named} is missing at time {wanted[at]:.12g}; {_COMPLETE}"
             return "missing time", self.rows[first][at], text
         if added.any():
             at = int(np.argmax(added))
-            text = f"another body is missing at time {time[at]:.12g}; add its row"
+            text = f"another body is missing at time {time[at]:.12g}; {_COMPLETE}"
             return "missing time", rows[at], text
         apart = np.abs(self.pusher(body) - self.pusher(first)).max(axis=1)
         if (apart > _SAME_PLACE).any():

@@ -57,15 +57,17 @@ class Problems:
         more = self._count - len(shown)
         return (*shown, *([f"and {more} more problem{'s' * (more > 1)}."] * bool(more)))
 
-    def raise_any(self, *, skip_bad: bool = False) -> None:
+    def raise_any(self, *, skip_bad: bool = False, good: int = 0) -> None:
         """Raise `BadTable` if there are problems.
 
         Args:
             skip_bad: leave out the pushes that have a problem. Problems of whole files
                 are raised all the same.
+            good: number of pushes without a problem.
         """
         if self and (self._of_files or not skip_bad):
-            raise BadTable(*self.lines)
+            hint = f"Give `skip_bad` to leave bad pushes out; {good} have no problem."
+            raise BadTable(*self.lines, *[hint] * (good > 0 and not self._of_files))
 
     def warn(self, path: Path, left_out: int, pushes: int) -> None:
         """Log how many pushes of a file are left out, and why."""
