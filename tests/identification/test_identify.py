@@ -294,6 +294,11 @@ def test_a_wide_interval_is_not_identifiable(name, value, low, high, says):
     assert from_coordinate(name, to_coordinate(name, value)) == pytest.approx(value)
 
 
+def test_a_parameter_without_a_slope_is_not_said_to_fit_everywhere():
+    """Where no contact slips, a larger friction changes nothing; a low one does."""
+    assert doubt("pusher_friction", 0.3, 0.01, 2.0) == "too few pushes depend on it"
+
+
 def test_scenes_without_friction_are_refused_without_output(store, tmp_path):
     arrays = store.read(slice(None)) | {"table_friction": np.zeros(24, np.float32)}
     slippery = write(tmp_path / "data", store.info, arrays)

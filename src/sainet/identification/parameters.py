@@ -75,7 +75,7 @@ def doubt(name: str, value: float, low: float, high: float) -> str | None:
     """
     least, most = BOUNDS[name]
     if (low, high) == (least, most):
-        return f"too few pushes depend on it: anything from {least:g} to {most:g} fits"
+        return "too few pushes depend on it"  # which leaves no interval
     if value - least < _AT_BOUND * abs(least) or most - value < _AT_BOUND * most:
         return f"it is at the edge of the search range, {least:g} to {most:g}"
     if high - low > _VAGUE_MM if name in CAMERA else high > _VAGUE * low:
