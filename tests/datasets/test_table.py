@@ -262,8 +262,7 @@ def test_hostile_tables_give_one_line_with_the_row_and_leave_nothing(
     with pytest.raises(BadTable, match=wanted) as caught:
         import_table(table, bodies, tmp_path / "out")
     assert str(caught.value).startswith(f"{table}: ")
-    hints = [line.startswith("Give `skip_bad`") for line in caught.value.problems[1:]]
-    assert hints == [True] * (case == "body missing")  # and one push has no problem
+    assert len(str(caught.value).splitlines()) == 1
     assert sorted(p.name for p in tmp_path.iterdir()) == ["bodies.toml", "pushes.csv"]
 
 

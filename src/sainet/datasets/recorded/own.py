@@ -69,12 +69,14 @@ def import_table(
     bodies = _present(table, known, Path(properties), problems)
     recordings = list(_recordings(table, bodies, problems)) if bodies else []
     good = len(recordings)
-    problems.raise_any(skip_bad=skip_bad and good > 0, good=good)
+    count = len(table.texts["push"].names) if good else 0
+    # If most pushes are bad, for example by their unit, so may be the others.
+    hinted = good if 2 * good > count else 0
+    problems.raise_any(skip_bad=skip_bad and good > 0, good=hinted)
     assert bodies is not None
     settings = {"command": "import table", "source": path.name}
     settings |= {"source_sha256": content_hash(data)} | units.settings
     if skip_bad:
-        count = len(table.texts["push"].names)
         settings |= {"skip_bad": True, "left_out": count - good}
         problems.warn(path, count - good, count)
     return import_pushes(out, settings, [*map(resample, recordings)], bodies)

@@ -63,7 +63,7 @@ class Problems:
         Args:
             skip_bad: leave out the pushes that have a problem. Problems of whole files
                 are raised all the same.
-            good: number of pushes without a problem.
+            good: pushes without a problem; 0: do not propose to skip the others.
         """
         if self and (self._of_files or not skip_bad):
             hint = f"Give `skip_bad` to leave bad pushes out; {good} have no problem."
