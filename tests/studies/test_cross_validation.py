@@ -228,7 +228,7 @@ def test_candidates_come_from_the_simplest():
 def test_pushes_that_a_candidate_cannot_be_fitted_to_are_refused_at_once(tmp_path):
     info = info_of(PUSHES, engine="recorded", seed=None, bodies=3)
     store = write(tmp_path / "three", info, end_points_alone(made_up(info)))
-    with pytest.raises(BadStore, match="3 disks.*train a network"):
+    with pytest.raises(BadStore, match="3 disks.*network .*`models` sain sain-p"):
         cross_validated(store, ("kind",), FOLDS, candidates_named(["gp-angle"]))
     with pytest.raises(BadStore, match="20 pushes, of which 4 would calibrate"):
         candidates_named(["sain-ensemble"])[0].check(store.first(20))

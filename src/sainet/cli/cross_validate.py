@@ -42,10 +42,11 @@ class CrossValidate:
     """Number of folds."""
     models: tuple[CandidateName, ...] = USUAL_CANDIDATES
     """Learned models to compare with the engine as it is and the identified engine:
-    Gaussian processes (gp) and networks (sain). side: if all pushes are of the same
-    disk. place: if they are also on the same part of one table. chosen: the kernel,
-    and the inputs up to these, are chosen in each fold (side takes six times as long,
-    place nine). ensemble: the mean of five networks, with 90 % regions."""
+    Gaussian processes (gp; of one or two disks) and networks (sain). side: if all
+    pushes are of the same disk. place: if they are also on the same part of one table.
+    chosen: the kernel, and the inputs up to these, are chosen in each fold (side takes
+    six times as long, place nine). ensemble: the mean of five networks, with 90 %
+    regions."""
     group: str | None = None
     """Group of the pushes, or their surface (default: all groups)."""
     pushes: int | None = None
