@@ -498,8 +498,9 @@ COUNTS = {
     ),
     "code lines of the engineer's path": (
         # Rounding that is no variation, times of the ends of a stroke: 10.
+        # Disks that turn against their pushes: 12. Bad pushes to leave out: 2.
         lambda: sum(map(code_lines, modules_of(ENGINEER))),
-        606,
+        620,
         600,
     ),
     "code lines of the page of an evaluation": (

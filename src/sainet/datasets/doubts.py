@@ -20,7 +20,6 @@ NEAR = 0.005  # m: a pusher farther away moves no disk
 STILL = 0.002  # m
 SLACK = 0.003  # m, of the bounds on travel and rotation
 _LEAST_FRICTION = 0.05
-_FEW = 3  # pushes
 _TEXTS = {
     "duplicate": "starts and is commanded as push {}; keep one of them",
     "no known pose": "no pose after the start is known; no model can learn from it",
@@ -125,5 +124,5 @@ def _of_sense(facts: Facts) -> Iterator[_Rule]:
     side = far[pushed] * np.sin(facts.direction)  # of the path, from the centre
     clear = (np.abs(turned) * facts.radius[pushed] > SLACK) & (np.abs(side) > NEAR)
     against = clear & (turned * side > 0)
-    are_most = against.sum() > max(3 * (clear & ~against).sum(), _FEW)
+    are_most = against.sum() > 3 * max(1, (clear & ~against).sum())
     yield "turned the other way", against & are_most, (np.rad2deg(turned),)

@@ -118,9 +118,8 @@ def check_store(store: Store, settings: ProcessSettings) -> None:
         )
     if info.bodies > BODIES:
         raise BadStore(
-            f"{path}: pushes of {info.bodies} disks; the inputs of a Gaussian process "
-            "describe one or two, train a network (to cross-validate, give `models` "
-            "sain sain-place)."
+            f"{path}: {info.bodies} disks; a Gaussian process takes one or two, train "
+            "a network (to cross-validate, give `models` sain sain-place)."
         )
     if info.pushes > MOST:
         raise BadStore(

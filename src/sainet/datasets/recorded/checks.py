@@ -150,11 +150,9 @@ def _jump(
     of: tuple[str, int, str],
 ) -> Iterator[Problem]:
     """Yield the first jump, if any; samples further apart than 4 ms may move more."""
-    passed = np.diff(time)
-    jump = _first(moved > allowed * np.maximum(passed / _SPACING, 1))
-    if jump is not None:
+    if jump := _first(moved > allowed * np.maximum(np.diff(time) / _SPACING, 1)):
         what, body, unit = of
-        by = f"{moved[jump - 1]:.3g} {unit} in {passed[jump - 1]:.3g} s"
+        by = f"{moved[jump - 1]:.3g} {unit} in {time[jump] - time[jump - 1]:.3g} s"
         text = f"{what} jumps by {by}; repair it or remove the push"
         yield Problem(f"{what} jumps", text, sample=jump, body=body)
 

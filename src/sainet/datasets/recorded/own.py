@@ -22,7 +22,6 @@ _log = logging.getLogger(__name__)
 _PLACES = ("x", "y", "pusher_x", "pusher_y")
 _PLACE = replace(checks.PLACE, remedy="in another unit, give `length_unit`")
 _ANGLE = replace(checks.ANGLE, remedy="in another unit, give `angle_unit`")
-_COMPLETE = "add its row, or remove all rows of that time"
 _SAME_PLACE = 1e-6  # m
 COLUMNS = tables.Columns(
     texts=("push", "body"),
@@ -69,14 +68,12 @@ def import_table(
     bodies = _present(table, known, Path(properties), problems)
     recordings = list(_recordings(table, bodies, problems)) if bodies else []
     good = len(recordings)
-    count = len(table.texts["push"].names) if good else 0
-    # If most pushes are bad, for example by their unit, so may be the others.
-    hinted = good if 2 * good > count else 0
-    problems.raise_any(skip_bad=skip_bad and good > 0, good=hinted)
+    problems.raise_any(skip_bad=skip_bad and good > 0, good=good)
     assert bodies is not None
     settings = {"command": "import table", "source": path.name}
     settings |= {"source_sha256": content_hash(data)} | units.settings
     if skip_bad:
+        count = len(table.texts["push"].names)
         settings |= {"skip_bad": True, "left_out": count - good}
         problems.warn(path, count - good, count)
     return import_pushes(out, settings, [*map(resample, recordings)], bodies)
@@ -219,15 +216,14 @@ class _Push:
             wrong = "appears twice" if same else f"comes after {time[fall - 1]:.12g}"
             text = f"{named}: time {time[fall]:.12g} {wrong}; sort the times, remove "
             return "clock", rows[fall], text + "the row, or give each push its own name"
-        missing, added = ~np.isin(wanted, time), ~np.isin(time, wanted)
-        if missing.any():
-            at = int(np.argmax(missing))
-            text = f"{named} is missing at time {wanted[at]:.12g}; {_COMPLETE}"
-            return "missing time", self.rows[first][at], text
-        if added.any():
-            at = int(np.argmax(added))
-            text = f"another body is missing at time {time[at]:.12g}; {_COMPLETE}"
-            return "missing time", rows[at], text
+        here = ~np.isin(wanted, time), named, first
+        there = ~np.isin(time, wanted), "another body", body
+        for missing, who, of in (here, there):
+            if missing.any():
+                at = int(np.argmax(missing))
+                text = f"{who} is missing at time {self.time(of)[at]:.12g}; add its "
+                text += "row, or remove all rows of that time"
+                return "missing time", self.rows[of][at], text
         apart = np.abs(self.pusher(body) - self.pusher(first)).max(axis=1)
         if (apart > _SAME_PLACE).any():
             text = "the pusher is elsewhere than in the row of another body at the same"

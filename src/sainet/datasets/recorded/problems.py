@@ -63,11 +63,13 @@ class Problems:
         Args:
             skip_bad: leave out the pushes that have a problem. Problems of whole files
                 are raised all the same.
-            good: pushes without a problem; 0: do not propose to skip the others.
+            good: number of pushes without a problem. If there are more problems, for
+                example by a mistaken unit, the message does not propose to skip.
         """
         if self and (self._of_files or not skip_bad):
             hint = f"Give `skip_bad` to leave bad pushes out; {good} have no problem."
-            raise BadTable(*self.lines, *[hint] * (good > 0 and not self._of_files))
+            are_few = good > self._count and not self._of_files
+            raise BadTable(*self.lines, *[hint] * are_few)
 
     def warn(self, path: Path, left_out: int, pushes: int) -> None:
         """Log how many pushes of a file are left out, and why."""
