@@ -109,9 +109,14 @@ def test_intervals_contain_the_true_values(found):
     assert found.after_deg < 0.7 * found.before_deg
 
 
-def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(store, monkeypatch):
+@pytest.mark.parametrize("repeats", [1, 4])
+def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(
+    store, monkeypatch, repeats
+):
     """Each end leaves out 2.5 percent: 1.96 standard errors from the estimate."""
-    wrong_by = 0.01 * np.random.default_rng(0).normal(size=(400, 1))  # mm
+    pushes = 400 // repeats
+    drawn = 0.01 * np.random.default_rng(0).normal(size=(pushes, 1))  # mm
+    wrong_by = drawn.repeat(repeats, axis=0)
 
     def residuals(at, scale, part):
         return at["camera_x_mm"] - wrong_by
@@ -120,11 +125,29 @@ def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(store, monkeyp
     monkeypatch.setattr(
         intervals_module, "slopes", lambda *problem: np.ones((400, 1, 1))
     )
-    value, error = wrong_by.mean(), wrong_by.std() / np.sqrt(400)
-    problem = ["camera_x_mm"], Scale(1, 1), samples(store)[:1]
+    value, error = drawn.mean(), drawn.std() / np.sqrt(pushes)
+    kinds, steps = np.arange(400) // repeats, np.zeros((400, 1), int)
+    sample = replace(samples(store)[0], kinds=kinds, steps=steps)
+    problem = ["camera_x_mm"], Scale(1, 1), [sample]
     found = intervals({"camera_x_mm": value}, *problem)
     ends = (np.array(found["camera_x_mm"]) - value) / error
-    np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.12)
+    np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.2)
+
+
+def test_pushes_stored_twice_do_not_narrow_intervals(store, found, tmp_path):
+    arrays = {n: np.tile(a, (2, *[1] * (a.ndim - 1))) for n, a in whole(store).items()}
+    write_store(tmp_path, structs.replace(store.info, pushes=48), arrays)
+    twice = {each.name: each for each in identify(open_store(tmp_path)).estimates}
+    for once in found.estimates:
+        again = twice[once.name]
+        assert again.doubt == once.doubt
+        if not once.doubt:
+            known = again.value, again.low, again.high
+            assert known == pytest.approx((once.value, once.low, once.high), rel=0.02)
+
+
+def whole(store):
+    return {name: np.array(value) for name, value in store.read(slice(None)).items()}
 
 
 def test_unidentifiable_parameters_keep_their_initial_values(found):

@@ -193,8 +193,9 @@ def identify(
     Nonlinear least squares (SciPy, robust against outliers) on the position and
     rotation errors at the observed steps, divided by the initial errors of the engine.
     The 95 % intervals are a bootstrap over pushes, with one Gauss-Newton step for each
-    resample. Parameters that are not identifiable keep their initial values, unless the
-    pushes contradict these, and the others are estimated again.
+    resample; repeats of a push stay together. Parameters that are not identifiable keep
+    their initial values, unless the pushes contradict these, and the others are
+    estimated again.
 
     Args:
         store: pushes along paths, with observed final poses at least.
@@ -271,7 +272,5 @@ def _mean_errors(
     # Average over each push first, because pushes differ in their observed steps.
     place = [np.linalg.norm(e[..., :2], axis=-1).mean(axis=(1, 2)) for e in errors]
     turn = [np.abs(e[..., 2]).mean(axis=(1, 2)) for e in errors]
-    return (
-        1000 * float(np.concatenate(place).mean()),
-        float(np.rad2deg(np.concatenate(turn).mean())),
-    )
+    m, rad = (np.concatenate(each).mean() for each in (place, turn))
+    return 1000 * float(m), float(np.rad2deg(rad))

@@ -1,6 +1,6 @@
 """Errors of an engine at observed steps, their derivatives, and intervals from them.
 
-The intervals of the parameters are a bootstrap over pushes.
+The intervals of the parameters are a bootstrap over pushes; repeats stay together.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,6 +36,7 @@ class Sample:
 
     batch: PushBatch
     steps: Int[np.ndarray, "push look"]  # observed steps, the last one repeated
+    kinds: Int[np.ndarray, " push"]  # equal numbers: repeats of one push
     own: Own = None  # an engine of the user's own; None: the planar engine
 
     @cached_property
@@ -64,17 +65,17 @@ def samples(store: Store, own: Own = None) -> list[Sample]:
         own: an engine of the user's own; None: the planar engine.
     """
     lengths = shared_lengths(store.read(slice(None), ("steps",))["steps"])
-    found = []
+    found, kinds = [], store.repeats()
     for length in np.unique(lengths):
         same = np.flatnonzero(lengths == length)
         for start in range(0, len(same), _BATCH):
-            part = store.take(same[start : start + _BATCH])
+            part = store.take(rows := same[start : start + _BATCH])
             batch = to_batch(part.read(slice(None)), part.info, steps=int(length))
             seen = np.asarray(batch.pose_observed).any(axis=1)
             if seen.any():
                 batch = jax.tree.map(lambda x, seen=seen: x[seen], batch)
                 looks = _looks(np.asarray(batch.pose_observed))
-                found.append(Sample(batch, looks, own))
+                found.append(Sample(batch, looks, kinds[rows][seen], own))
     return found
 
 
@@ -165,8 +166,9 @@ def intervals(
 ) -> dict[str, tuple[float, float]]:
     """Return the 95 % interval of each free parameter.
 
-    A parameter that affects fewer than four pushes has the whole search range as its
-    interval: pushes with zero slope resample to zero steps, a false certainty.
+    Repeats of a push share most of their error, so they are resampled together. A
+    parameter that affects fewer than four different pushes has the whole search range
+    as its interval: pushes with zero slope resample to zero steps, a false certainty.
     """
     at = to_coordinates(values)
     matrices, vectors = [], []
@@ -175,40 +177,44 @@ def intervals(
         weight = 1 / np.sqrt(1 + error**2)  # of the soft l1 loss
         matrices.append(np.einsum("pn,pni,pnj->pij", weight, slope, slope))
         vectors.append(np.einsum("pn,pni,pn->pi", weight, slope, error))
-    matrix, vector = np.concatenate(matrices), np.concatenate(vectors)
-    identifiable = _is_identifiable(matrix)
-    if not identifiable.any():  # a Gauss-Newton step may have no solution
-        return {name: BOUNDS[name] for name in free}
+    kinds = np.concatenate([part.kinds for part in parts])
+    matrix, vector = (_sums(np.concatenate(x), kinds) for x in (matrices, vectors))
+    vague = ~_is_identifiable(matrix)
+    whole = {n: BOUNDS[n] for n, is_vague in zip(free, vague, strict=True) if is_vague}
+    if len(whole) == len(free):  # a Gauss-Newton step may have no solution
+        return whole
     steps = _resampled_steps(matrix, vector)
     draws = np.clip(np.array([at[name] for name in free]) - steps, *bounds_of(free))
-    lows, highs = np.percentile(draws, _INTERVAL, axis=0).tolist()
-    return {
-        name: (from_coordinate(name, low), from_coordinate(name, high))
-        if is_identifiable
-        else BOUNDS[name]
-        for name, low, high, is_identifiable in zip(
-            free, lows, highs, identifiable, strict=True
-        )
-    }
+    ends = zip(free, *np.percentile(draws, _INTERVAL, axis=0).tolist(), strict=True)
+    found = {n: (from_coordinate(n, a), from_coordinate(n, b)) for n, a, b in ends}
+    return found | whole
 
 
-def _is_identifiable(matrix: Float[np.ndarray, "push p p"]) -> Bool[np.ndarray, " p"]:
-    """Return whether a parameter affects more than its three most affected pushes."""
+def _sums(values: np.ndarray, kinds: Int[np.ndarray, " push"]) -> np.ndarray:
+    """Return the sum over the repeats of each push, in the order of the first ones."""
+    _, first, kind = np.unique(kinds, return_index=True, return_inverse=True)
+    sums = np.zeros_like(values)
+    np.add.at(sums, first[kind], values)
+    return sums[np.sort(first)]
+
+
+def _is_identifiable(matrix: Float[np.ndarray, "kind p p"]) -> Bool[np.ndarray, " p"]:
+    """Return whether more than the three most affected kinds depend on a parameter."""
     curvature = np.sort(np.einsum("pii->pi", matrix), axis=0)
     return curvature[: 1 - LEAST_PUSHES].sum(axis=0) > _ridge(matrix)
 
 
-def _ridge(matrix: Float[np.ndarray, "push p p"]) -> float:
+def _ridge(matrix: Float[np.ndarray, "kind p p"]) -> float:
     return _RIDGE * float(np.trace(matrix.sum(axis=0)))
 
 
 def _resampled_steps(
-    matrix: Float[np.ndarray, "push p p"], vector: Float[np.ndarray, "push p"]
+    matrix: Float[np.ndarray, "kind p p"], vector: Float[np.ndarray, "kind p"]
 ) -> Float[np.ndarray, "resample p"]:
     """Return the Gauss-Newton step from the solution for each resample."""
-    pushes, size = vector.shape
+    kinds, size = vector.shape
     rng = np.random.default_rng(_BOOTSTRAP)
-    counts = rng.multinomial(pushes, np.full(pushes, 1 / pushes), _RESAMPLES)
+    counts = rng.multinomial(kinds, np.full(kinds, 1 / kinds), _RESAMPLES)
     left = np.einsum("rp,pij->rij", counts, matrix) + _ridge(matrix) * np.eye(size)
     right = np.einsum("rp,pi->ri", counts, vector)
     return np.linalg.solve(left, right[..., None])[..., 0]
