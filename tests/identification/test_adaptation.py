@@ -197,6 +197,17 @@ def test_pushes_with_trouble_are_left_out():
     )
 
 
+@pytest.mark.parametrize("seen", [[], [0], [0, 1]])
+def test_pushes_whose_end_is_unknown_are_left_out(seen):
+    """The camera sees disk 2 in few samples, and none of them shows where it ended."""
+    adaptation = Adaptation(load_model("physics-true"), TRUE)
+    whole = recording_of(TRUE, *PUSHES[0])
+    time, pose, pusher = whole.time * 0.9, whole.pose.copy(), whole.pusher
+    pose[np.isin(np.arange(len(time)), seen, invert=True), 1] = np.nan
+    adaptation.add(replace(whole, time=time, pose=pose, pusher=pusher))
+    assert len(adaptation._pushes) == 0
+
+
 def test_other_engines_are_refused():
     with pytest.raises(BadInput, match="`adapt` uses the derivatives of the planar"):
         Adaptation(load_model("physics", engine="bullet"), TRUE)

@@ -19,6 +19,7 @@ from jax import lax
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
+from sainet.datasets.recorded.checks import clock_problems
 from sainet.datasets.recorded.resample import ResampledPush, resample
 from sainet.engines.base import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
@@ -180,10 +181,10 @@ class Adaptation:
         Args:
             recording: of an executed push (s, m, rad).
         """
-        if recording.trouble:
+        if recording.trouble or any(clock_problems(recording)):
             return
         push = resample(recording)
-        if push.steps >= 1 and np.isfinite(push.motion[..., :3]).all(axis=(1, 2)).any():
+        if np.isfinite(push.motion[..., :3]).all(axis=(1, 2)).any():
             self._pushes.append(_settled(push, recording.commanded))
 
     def adapted(self, state: State) -> tuple[AbstractDynamics, Scene]:
