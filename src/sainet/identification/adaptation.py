@@ -83,13 +83,12 @@ class Properties(NamedTuple):
 
 
 class _Pushes(NamedTuple):
-    """The pushes that are remembered; weight 0 fills up a fixed number."""
+    """The pushes that are remembered; filled up with some that touch no disk."""
 
     start: Float[Array, "push body 3"]  # m, m, rad
     pusher: Float[Array, "push 2"]  # m
     path: Float[Array, "push time 2"]  # m
     end: Float[Array, "push body 3"]
-    weight: Float[Array, " push"]
 
 
 class _Given(NamedTuple):
@@ -213,16 +212,15 @@ class Adaptation:
         offset = np.array(self._camera.vector)
         apart = _apart(self._given.scene.body_count)
         start, end = np.broadcast_to(apart, (2, REMEMBERED, *apart.shape)).copy()
-        pusher, weight = np.full((REMEMBERED, 2), -1.0), np.zeros(REMEMBERED)
+        pusher = np.full((REMEMBERED, 2), -1.0)
         longest = max((each.steps for each in self._pushes), default=_BUCKET)
         steps = -(-longest // _BUCKET) * _BUCKET
         path = np.full((REMEMBERED, steps, 2), -1.0)
         for row, each in enumerate(self._pushes):
             push = each.push
             start[row], pusher[row] = push.initial, push.initial_pusher + offset
-            path[row] = each.path(steps) + offset
-            end[row], weight[row] = each.end(), 1.0
-        arrays = (start, pusher, path, end, weight)
+            path[row], end[row] = each.path(steps) + offset, each.end()
+        arrays = (start, pusher, path, end)
         return _Pushes(*(jnp.asarray(each, jnp.float32) for each in arrays))
 
 
@@ -266,7 +264,7 @@ def _errors(
     found: Properties, given: _Given, pushes: _Pushes, seen: Float[Array, "1 body 3"]
 ) -> Float[Array, " number"]:
     """Return errors at the ends of pushes, and overlaps, over their deviations."""
-    scene, count = found.scene(given.scene), len(pushes.weight)
+    scene, count = found.scene(given.scene), len(pushes.start)
     scenes = jax.tree.map(lambda x: jnp.broadcast_to(x, (count, *x.shape)), scene)
     start = at_rest(pushes.start[..., :2], pushes.start[..., 2], pushes.pusher)
     before = jnp.concatenate([pushes.pusher[:, None], pushes.path[:, :-1]], axis=1)
@@ -281,5 +279,4 @@ def _errors(
     )
     gaps = jax.vmap(lambda each: pair_gaps(scene, each))(states)
     overlap = jnp.maximum(-gaps, 0.0) / OVERLAP_M
-    weighted = missed * pushes.weight[:, None, None]
-    return jnp.concatenate([weighted.ravel(), overlap.ravel()])
+    return jnp.concatenate([missed.ravel(), overlap.ravel()])
