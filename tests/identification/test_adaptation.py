@@ -14,7 +14,7 @@ from sainet.control.trial import make_trial
 from sainet.control.trials import prepare
 from sainet.engines.base import AssumedProperties
 from sainet.engines.planar.engine import PlanarEngine
-from sainet.engines.simulator import Assumptions, InternalEngine
+from sainet.engines.simulator import Assumptions, InternalEngine, PlanarSpec
 from sainet.identification.adaptation import REMEMBERED, Adaptation, Properties
 from sainet.models.library import load_model
 from sainet.runs.errors import BadInput
@@ -206,6 +206,72 @@ def test_pushes_whose_end_is_unknown_are_left_out(seen):
     pose[np.isin(np.arange(len(time)), seen, invert=True), 1] = np.nan
     adaptation.add(replace(whole, time=time, pose=pose, pusher=pusher))
     assert len(adaptation._pushes) == 0
+
+
+def test_a_recording_that_ends_before_rest_counts_to_its_last_pose():
+    adaptation = Adaptation(load_model("physics-true"), wrong(TRUE, (0.95, 1.05)))
+    for push in PUSHES:
+        whole = recording_of(TRUE, *push)
+        parts = {name: getattr(whole, name)[:72] for name in ("time", "pose", "pusher")}
+        adaptation.add(replace(whole, **parts))
+    _, found = adaptation.adapted(TRUE.in_a_row())
+    assert np.allclose(found.radius, TRUE.radius, rtol=0.005)
+
+
+def test_noise_of_poses_at_rest_and_whole_turns_have_no_effect():
+    adaptation = Adaptation(load_model("physics-true"), wrong(TRUE, (0.95, 1.05)))
+    sign = np.where(np.arange(STEPS + 1) % 2, 1, -1)[:, None, None]
+    for push in PUSHES:
+        whole = recording_of(TRUE, *push)
+        pose = whole.pose.copy()
+        pose[81:] += (sign * [2e-3, -2e-3, 0.05])[81:]
+        pose[60:, :, 2] += 2 * np.pi
+        adaptation.add(replace(whole, pose=pose))
+    _, found = adaptation.adapted(TRUE.in_a_row())
+    assert np.allclose(found.radius, TRUE.radius, rtol=0.005)
+
+
+def test_properties_are_factors_of_those_that_are_given():
+    factors = Properties(
+        *(jnp.log(jnp.array(x)) for x in ([1.1, 0.9], [1.2], [2, 3])),
+        jnp.log(jnp.float32(0.5)),
+    )
+    found = factors.scene(TRUE)
+    np.testing.assert_allclose(found.radius, TRUE.radius * jnp.array([1.1, 0.9]), 1e-6)
+    np.testing.assert_allclose(found.mass, TRUE.mass * jnp.array([1.0, 1.2]), 1e-6)
+    frictions = found.pusher_friction, found.disk_friction, found.table_friction
+    np.testing.assert_allclose(frictions, [0.5, 0.75, 0.15], 1e-6)
+    ratio = factors.engine(jnp.float32(0.8)).pressure_radius_ratio
+    assert float(ratio) == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("name", ["in", "sain", "sain-bullet"])
+def test_every_network_begins_with_the_given_properties(name):
+    model = load_model(name)
+    dynamics, found = Adaptation(model, TRUE).adapted(TRUE.in_a_row())
+    assert dynamics is model.dynamics
+    np.testing.assert_allclose(found.radius, TRUE.radius, rtol=1e-3)
+    np.testing.assert_allclose(found.mass, TRUE.mass, rtol=1e-3)
+
+
+def test_physics_begins_with_the_parameters_of_its_engine():
+    model = load_model("physics-true")
+    assumed = Assumptions(pusher_friction=0.4)
+    spec = PlanarSpec(assumptions=assumed, pressure_radius_ratio=0.9)
+    identified = replace(model, internal=InternalEngine(spec, CameraOffset()))
+    dynamics, found = Adaptation(identified, TRUE).adapted(TRUE.in_a_row())
+    ratio = dynamics.engine.engine.pressure_radius_ratio
+    assert float(ratio) == pytest.approx(0.9, rel=1e-3)
+    assert float(found.pusher_friction) == pytest.approx(0.4, rel=1e-3)
+
+
+def test_an_observation_that_is_not_finite_changes_nothing():
+    """The planner refuses it and names its field."""
+    adaptation, before = after(wrong(TRUE, (0.95, 1.05)), [TRUE] * 2)
+    state = TRUE.in_a_row()
+    lost = eqx.tree_at(lambda s: s.position, state, state.position.at[1].set(jnp.nan))
+    _, found = adaptation.adapted(lost)
+    np.testing.assert_array_equal(found.radius, before.radius)
 
 
 def test_other_engines_are_refused():
