@@ -30,6 +30,7 @@ from sainet.identification.parameters import (
 )
 from sainet.identification.residuals import (
     Scale,
+    _looks,
     intervals,
     pose_errors,
     residuals,
@@ -125,13 +126,19 @@ def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(
     monkeypatch.setattr(
         intervals_module, "slopes", lambda *problem: np.ones((400, 1, 1))
     )
-    value, error = drawn.mean(), drawn.std() / np.sqrt(pushes)
-    kinds, steps = np.arange(400) // repeats, np.zeros((400, 1), int)
-    sample = replace(samples(store)[0], kinds=kinds, steps=steps)
+    mean, error = drawn.mean(), drawn.std() / np.sqrt(pushes)
+    sample = of_kinds(samples(store)[0], np.arange(400) // repeats)
     problem = ["camera_x_mm"], Scale(1, 1), [sample]
-    found = intervals({"camera_x_mm": value}, *problem)
-    ends = (np.array(found["camera_x_mm"]) - value) / error
-    np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.2)
+    for value in (mean, mean + 3 * error):  # a step leads to the solution
+        found = intervals({"camera_x_mm": value}, *problem)
+        ends = (np.array(found["camera_x_mm"]) - mean) / error
+        np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.2)
+    wrong_by += 5  # mm: the end of the search range
+    assert intervals({"camera_x_mm": mean + 5}, *problem)["camera_x_mm"][1] == 5.0
+
+
+def of_kinds(part, kinds):
+    return replace(part, kinds=kinds, steps=np.zeros((len(kinds), 1), int))
 
 
 def test_pushes_stored_twice_do_not_narrow_intervals(store, found, tmp_path):
@@ -148,6 +155,88 @@ def test_pushes_stored_twice_do_not_narrow_intervals(store, found, tmp_path):
 
 def whole(store):
     return {name: np.array(value) for name, value in store.read(slice(None)).items()}
+
+
+CAMERA = {"camera_x_mm": 0.3, "camera_y_mm": -0.2}
+
+
+@pytest.fixture
+def part(store):
+    return samples(store)[0]
+
+
+def intervals_of(part, monkeypatch, errors, slope):
+    monkeypatch.setattr(intervals_module, "residuals", lambda *problem: errors)
+    monkeypatch.setattr(intervals_module, "slopes", lambda *problem: slope)
+    part = of_kinds(part, np.arange(len(errors)))
+    found = intervals(CAMERA, list(CAMERA), Scale(1, 1), [part])
+    return np.array([found[name] for name in CAMERA])
+
+
+def test_intervals_are_those_of_a_loop_over_resamples(part, monkeypatch):
+    """Large errors count less, as in the soft l1 loss."""
+    rng = np.random.default_rng(1)
+    errors, slope = rng.normal(0.1, 1, (30, 5)), rng.normal(2, 1, (30, 5, 2))
+    errors[:3] *= 20
+    draws = []
+    for _ in range(4000):
+        chosen = rng.integers(30, size=30)
+        error, matrix = errors[chosen].ravel(), slope[chosen].reshape(-1, 2)
+        weight = (1 + error**2) ** -0.25
+        step = np.linalg.lstsq(weight[:, None] * matrix, weight * error)[0]
+        draws.append([*CAMERA.values()] - step)
+    wanted = np.percentile(draws, [2.5, 97.5], axis=0).T
+    found = intervals_of(part, monkeypatch, errors, slope)
+    np.testing.assert_allclose(found, wanted, atol=0.08 * np.ptp(wanted, axis=1).min())
+
+
+@pytest.mark.parametrize("pushes", [0, 3, 4])
+def test_a_parameter_is_identifiable_from_four_pushes_on(part, monkeypatch, pushes):
+    rng = np.random.default_rng(0)
+    slope = rng.normal(2, 1, (20, 5, 2))
+    slope[pushes:, :, 1] = 0
+    one, two = intervals_of(part, monkeypatch, rng.normal(size=(20, 5)), slope)
+    assert one[1] - one[0] < 1
+    assert (two == [-5, 5]).all() == (pushes < 4)
+    unknown = intervals_of(part, monkeypatch, np.ones((20, 5)), 0 * slope)
+    assert (unknown == [-5, 5]).all()
+
+
+def test_errors_are_predicted_minus_observed_poses_over_their_scale(part):
+    scale = Scale(1e-3, 1e-2)
+    at = {"pusher_friction": np.log(0.2), "camera_x_mm": 0.8}
+    batch, offset = part.batch, jnp.array([8e-4, 0.0])
+    scene = replace(batch.scene, pusher_friction=jnp.full(batch.size, 0.2))
+    moved = batch.initial.with_pusher_moved(offset), batch.controls.moved(offset)
+    pose = eqx.filter_jit(PlanarEngine().rollout)(scene, *moved).states.pose
+    found = residuals(at, scale, part).reshape(batch.size, -1, 1, 3)
+    for push, looks in enumerate(part.steps):
+        off = np.asarray(pose[push] - batch.measured[push])[looks]
+        wanted = off / [1e-3, 1e-3, 1e-2] / np.sqrt(len(looks))
+        np.testing.assert_allclose(found[push], wanted, atol=1e-4)
+
+
+def test_compared_poses_are_evenly_spaced_and_end_with_the_last_one():
+    observed = np.zeros((3, 20), bool)
+    observed[0, 2:18] = observed[1, [4, 9, 15]] = observed[2, 19] = True
+    found = _looks(observed)
+    np.testing.assert_array_equal(found[0], np.arange(3, 18, 2))
+    np.testing.assert_array_equal(found[1], [4, 4, 9, 9, 9, 15, 15, 15])
+    np.testing.assert_array_equal(found[2], [19] * 8)
+    assert _looks(observed[1:]).shape == (2, 3)
+
+
+def test_every_observed_push_is_in_one_sample(tmp_path):
+    """A sample has at most 256 pushes; pushes that were never observed are in none."""
+    info = info_of(300, chunk_size=100)
+    arrays = made_up(info)
+    arrays["mass"][:, 0] = 0.1 * (1 + np.arange(300))
+    arrays["pose_observed"][::10] = False
+    parts = samples(write(tmp_path / "data", info, arrays))
+    assert max(len(part.steps) for part in parts) <= 256
+    found = np.concatenate([part.batch.scene.mass[:, 0] for part in parts])
+    wanted = np.delete(arrays["mass"][:, 0], np.arange(0, 300, 10))
+    np.testing.assert_allclose(found, wanted, rtol=1e-6)
 
 
 def test_unidentifiable_parameters_keep_their_initial_values(found):
