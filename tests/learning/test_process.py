@@ -24,8 +24,11 @@ from sainet.engines.simulator import SIMULATORS, InternalEngine
 from sainet.evaluation.coverage import coverage_of, measured
 from sainet.evaluation.evaluate import evaluate
 from sainet.evaluation.unlike import other_numbers
+from sainet.learning import process as process_module
 from sainet.learning.process import (
+    _NEAR,
     calibrated_fit,
+    check_store,
     fit_process,
     fits_of,
     quantile,
@@ -40,9 +43,10 @@ from sainet.models.fitted_process import Fitted, corrector_of, rates_at
 from sainet.models.library import load_model
 from sainet.models.process_card import ARRAYS, PROCESS, ProcessSettings
 from sainet.runs.digests import digests_to_text
-from sainet.runs.errors import BadCheckpoint, BadInput, BadStore
+from sainet.runs.errors import BadCheckpoint, BadInput, BadStore, RunConflict
 from sainet.scenes.controls import PathControls
 from sainet.scenes.geometry import rotate
+from sainet.scenes.recording import CameraOffset
 from sainet.scenes.state import pack_motion
 from sainet.studies.run_report import page_of
 from sainet.tasks.push_to_goal import PushToGoal
@@ -265,6 +269,83 @@ def scattered(pushes: int, seed: int, loud: float) -> Ends:
     rates = rates + 0.02 * size * rng.normal(size=(pushes, 3))
     names = ("contact_angle", "place_x")
     return Ends(names, inputs, rates, np.ones(pushes), np.arange(pushes))
+
+
+def test_a_calibration_is_that_of_a_loop():
+    """Of pushes that were executed twice, and two disks; folds keep both together."""
+    settings = ProcessSettings(iterations=3, folds=3, seed=5)
+    ends, other = scattered(40, 3, loud=4.0), scattered(40, 4, loud=4.0)
+    rates = np.concatenate([ends.rates, 2 * other.rates], axis=1)
+    ends = replace(ends, rates=rates, kinds=np.arange(40) // 2)
+    fitted = calibrated_fit(ends, settings).fitted
+    whole, _ = fit_to(ends, settings)
+    begin = np.log(np.c_[whole.amplitude, np.sqrt(whole.noise), whole.length])
+    owner, mean, deviation = fold_of_push(ends.kinds, 3, 5), 0 * rates, 0 * rates
+    assert (owner[::2] == owner[1::2]).all()
+    for fold in range(3):
+        part, _ = fit_to(ends.take(owner != fold), settings, begin=begin)
+        held = owner == fold
+        mean[held], deviation[held] = rates_at(part, ends.inputs[held])
+    np.testing.assert_allclose(fitted.share, share_of(mean, rates))
+    off = rates - fitted.share * mean
+    for body, kind in np.ndindex(2, 2):
+        columns = slice(3 * body, 3 * body + 2) if kind == 0 else [3 * body + 2]
+        missed = np.linalg.norm(off[:, columns], axis=1)
+        found = np.linalg.norm((off / deviation)[:, columns], axis=1)
+        np.testing.assert_allclose(fitted.errors[:, body, kind], found)
+        assert fitted.plain[body, kind] == pytest.approx(np.sort(missed)[36])  # of 40
+        # Of two numbers their geometric mean: that of a circle of equal area.
+        size = np.exp(np.log(deviation[:, columns]).mean(axis=1))
+        length = np.exp(np.log(whole.length[columns]).mean(axis=0))
+        score, reach, near = min(
+            score_of(whole.inputs, found, size, owner, width * length)
+            for width in _NEAR
+        )
+        assert fitted.reach[body, kind] == pytest.approx(reach)
+        np.testing.assert_allclose(fitted.near[body, kind], near)
+
+
+def score_of(inputs, errors, size, owner, length):
+    """The mean interval score of neighbourhoods, its factor, and the length scales."""
+    expected = np.empty_like(errors)
+    for push, at in enumerate(inputs):
+        others = owner != owner[push]
+        far = np.sqrt(3) * np.linalg.norm((inputs[others] - at) / length, axis=1)
+        close = (1 + far) * np.exp(-far)
+        known = close @ errors[others] + errors.mean()
+        expected[push] = known / (close.sum() + 1)
+    factor = np.sort(errors / expected)[36]
+    width = factor * expected * size
+    score = np.mean(width + 10 * np.maximum(errors * size - width, 0))
+    return score, factor, tuple(length)
+
+
+def test_repeated_pushes_count_once_for_the_calibration(store, monkeypatch):
+    some = store.take([0, 0, 1, 1, 2, 2])
+    check_store(some, structs.replace(QUICK, folds=3))
+    with pytest.raises(BadStore, match="3 pushes that are not repeats .* at least 4"):
+        check_store(some, structs.replace(QUICK, folds=4))
+    monkeypatch.setattr(process_module, "MOST", 5)
+    with pytest.raises(BadStore, match="6 pushes; .* takes at most 5"):
+        check_store(some, structs.replace(QUICK, folds=3))
+
+
+def test_the_card_records_the_pushes_the_camera_and_the_groups(tmp_path):
+    info = info_of(14, groups=("wood", "abs"), engine="recorded", seed=None)
+    arrays = made_up(info) | {"group": np.arange(14) % 2}
+    arrays["initial_pusher"][:, 1] += np.linspace(-0.02, 0.02, 14)
+    arrays["pose_observed"][-2:] = False
+    write_store(tmp_path / "data", info, arrays)
+    store, camera = open_store(tmp_path / "data"), CameraOffset(x=1e-3)
+    engine = structs.replace(PLANAR, camera=camera)
+    settings = ProcessSettings(features="angle", iterations=2, folds=2)
+    fit_process(store, tmp_path / "gp", engine, settings)
+    card = load_model(str(tmp_path / "gp")).card
+    assert (card.trained_pushes, card.camera) == (12, camera)
+    assert (card.truth_engine, card.data) == ("recorded", store.content)
+    assert set(card.groups) == {"wood", "abs"}
+    with pytest.raises(RunConflict, match="data is"):
+        fit_process(store.first(13), tmp_path / "gp", engine, settings)
 
 
 def test_regions_are_larger_where_errors_were():
