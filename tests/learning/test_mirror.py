@@ -86,6 +86,8 @@ def test_each_iteration_mirrors_half_of_the_pushes(tmp_path):
     assert 0.4 < first.mean() < 0.6
     np.testing.assert_array_equal(first, mirrored(task, 1))
     assert (first != mirrored(task, 2)).any()
+    other = replace(task, recipe=recipe.changed(seed=1))
+    assert (first != mirrored(other, 1)).any()
     for change in ({"mirror": False}, {"features": "place"}):
         other = recipe.changed(**change)
         assert not mirrored(replace(task, recipe=other), 1).any()

@@ -1,6 +1,9 @@
 """The non-recurrent form: cut into single steps, trained, and started again."""
 
+from dataclasses import replace
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -65,15 +68,26 @@ def test_a_restarted_true_engine_stays_on_the_truth(quiet):
 
 
 def test_a_step_ends_where_the_next_one_begins(quiet):
-    steps = to_single_steps(quiet, None)
+    """Its target is the true pose, whatever the camera measured."""
+    seen = np.random.default_rng(0).random((2, *quiet.pose_observed.shape)) < 0.5
+    known = dict(zip(("pose_observed", "rate_observed"), jnp.array(seen), strict=True))
+    noisy = replace(quiet, measured=quiet.measured + 0.1, **known)
+    steps = to_single_steps(noisy, None)
     shape = quiet.truth.shape
     before = np.asarray(pack_motion(steps.initial)).reshape(shape)
     after = np.asarray(steps.truth).reshape(shape)
     np.testing.assert_array_equal(after, quiet.truth)
+    np.testing.assert_array_equal(steps.measured, steps.truth[..., :3])
+    for name, wanted in known.items():
+        found = np.asarray(getattr(steps, name)).reshape(shape[:2])
+        np.testing.assert_array_equal(found, wanted)
     np.testing.assert_array_equal(before[:, 1:], after[:, :-1])
     np.testing.assert_array_equal(before[:, 0], pack_motion(quiet.initial))
-    pusher = np.asarray(steps.initial.pusher_position).reshape(*shape[:2], 2)
-    np.testing.assert_array_equal(pusher[:, 1:], quiet.controls.position[:, :-1])
+    for name in ("position", "velocity"):
+        pusher = getattr(steps.initial, f"pusher_{name}").reshape(*shape[:2], 2)
+        command = getattr(quiet.controls, name)
+        np.testing.assert_array_equal(pusher[:, 1:], command[:, :-1])
+    np.testing.assert_array_equal(pusher[:, 0], 0)
     assert steps.simulated is None
 
 
