@@ -1,10 +1,13 @@
 """One network of datasets with several numbers of disks: reproducible, resumable."""
 
 import re
+from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from msgspec import structs
 
 from learning.stores import info_of, made_up, write
 from sainet.cli.entry import run
@@ -13,8 +16,10 @@ from sainet.learning import fit as fit_module
 from sainet.learning.fit import fit
 from sainet.learning.job import STATE
 from sainet.learning.loss import CONSTANT
-from sainet.learning.mixture import Batches, Mixture, pool
+from sainet.learning.mixture import Batches, Mixture, _check_alike, pool
 from sainet.learning.recipes import CONTACT, PAPER, FromModel
+from sainet.learning.sources import source_of
+from sainet.learning.step import data_loss, even_batch
 from sainet.learning.task import Task
 from sainet.models.card import WEIGHTS, read_card
 from sainet.models.checkpoint import load_network
@@ -51,6 +56,60 @@ def test_a_batch_has_one_number_of_disks_and_each_its_share(stores):
     assert all(batch.truth.shape[2] == turn + 1 for turn, batch in found)
     share = np.bincount([turn for turn, _ in found]) / 400
     np.testing.assert_allclose(share, [0.25, 0.5, 0.25], atol=0.06)
+
+
+def test_each_dataset_gives_its_batches_in_its_own_order(stores):
+    """Mirrored by the iteration, and filled up for all devices."""
+    of = mixture(stores, RECIPE.changed(iterations=24, batch_size=3, mirror=True))
+    batches, sources = Batches(of), [source_of(task) for task in of.tasks]
+    turns = []
+    for iteration in range(1, 25):
+        turn, batch = batches.take(iteration)
+        wanted = even_batch(sources[turn].take(turns.count(turn), iteration))
+        assert all(jax.tree.leaves(jax.tree.map(np.array_equal, batch, wanted)))
+        turns.append(turn)
+    for each in (batches, *sources):
+        each.close()
+    with pytest.raises(RuntimeError, match="after shutdown"):
+        batches.take(1)
+    other = Batches(mixture(stores, RECIPE.changed(iterations=24, seed=1)))
+    assert turns != [other.take(iteration)[0] for iteration in range(1, 25)]
+    other.close()
+
+
+def test_the_validation_loss_is_the_mean_over_the_pushes_of_all_datasets(stores):
+    of = mixture(stores[:2], RECIPE.changed(validation_share=0.3))
+    state, weights = of.begin()
+    total, loss, counts = 0.0, jax.jit(data_loss), []
+    for task, each in zip(of.tasks, weights, strict=True):
+        kept = task.validation
+        counts.append(kept.info.pushes)
+        batch = task.to_batch(kept.read(slice(None), task.names), 12)
+        total += float(loss(state.network, batch, each))
+    assert counts[0] < counts[1]
+    found = of.validate(weights)(state.network)
+    assert found == pytest.approx(total / sum(counts), rel=1e-5)
+    assert mixture(stores).validate(weights) is None
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"engine": "recorded"}, "engine is 'recorded', that of .* is 'planar'"),
+        ({"kind": "direct-force"}, "kind is 'direct-force', that of .* is 'robot'"),
+    ],
+)
+def test_datasets_of_several_setups_are_refused(stores, change, message):
+    store = stores[0]
+    info = structs.replace(store.info, **change)
+    with pytest.raises(BadStore, match=message):
+        _check_alike(store, replace(store, info=info))
+
+
+def test_networks_on_the_whole_state_take_one_number_of_disks(stores):
+    of = mixture(stores, PAPER.changed(features="whole-state"))
+    with pytest.raises(BadStore, match="pushes of 2 disks, not 1; a network on the"):
+        of.check()
 
 
 def test_an_interrupted_mixture_ends_with_the_same_network(
