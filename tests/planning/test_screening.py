@@ -101,6 +101,14 @@ def test_sequences_that_begin_with_an_infeasible_push_are_screened_out():
     assert not blocked[found.actions[:, 0]].any()
 
 
+def test_pushes_from_inside_a_disk_are_screened_out():
+    wide = PushGrid(contact_bins=10, direction_bins=2, contact_range=np.pi)
+    problem = Problem(shifted(), TASKS[0], SCENE, STATE, wide)
+    first = problem.first_level()
+    assert not np.isfinite(first.cost).all()
+    assert np.isfinite(Screen(problem, first).grow(first, np.arange(20)).cost).all()
+
+
 def test_a_residual_that_is_not_finite_does_not_spread():
     problem, first, _ = screen(TASKS[0])
     place = np.array(first.outcomes.state.position)
