@@ -274,8 +274,10 @@ def scattered(pushes: int, seed: int, loud: float) -> Ends:
 def test_a_calibration_is_that_of_a_loop():
     """Of pushes that were executed twice, and two disks; folds keep both together."""
     settings = ProcessSettings(iterations=3, folds=3, seed=5)
-    ends, other = scattered(40, 3, loud=4.0), scattered(40, 4, loud=4.0)
+    ends, other = scattered(40, 10, loud=4.0), scattered(40, 11, loud=4.0)
     rates = np.concatenate([ends.rates, 2 * other.rates], axis=1)
+    noise = rates[:, [1, 4]] - rates[:, [0, 3]]  # y follows another law than x
+    rates[:, [1, 4]] = 0.1 * np.sin(9 * ends.inputs[:, :1]) + 0.3 * noise
     ends = replace(ends, rates=rates, kinds=np.arange(40) // 2)
     fitted = calibrated_fit(ends, settings).fitted
     whole, _ = fit_to(ends, settings)
