@@ -203,6 +203,7 @@ def test_a_parameter_is_identifiable_from_four_pushes_on(part, monkeypatch, push
 
 
 def test_errors_are_predicted_minus_observed_poses_over_their_scale(part):
+    part = replace(part, steps=np.repeat(part.steps, 4, axis=1))
     scale = Scale(1e-3, 1e-2)
     at = {"pusher_friction": np.log(0.2), "camera_x_mm": 0.8}
     batch, offset = part.batch, jnp.array([8e-4, 0.0])
