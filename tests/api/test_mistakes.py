@@ -9,9 +9,12 @@ import sys
 import pytest
 
 START = """
+from dataclasses import replace
+
 import numpy as np
 
 import sainet as sn
+still = np.zeros((4, 2), np.float32)
 scene = sn.Scene.disks(mass=[0.9, 1.0], radius=[0.054, 0.059])
 state, push = scene.in_a_row(), sn.Push(0.2)
 own = sn.from_function(lambda *x: np.zeros((1, 200, 2, 3)), name="own")
@@ -32,6 +35,40 @@ MISTAKES = {
     ),
     "own.predict(0.9, state, push)": (
         "BadSetting `scene` is 0.9; it must be a Scene, for example of Scene.disks."
+    ),
+    "sn.at_rest([[0, 0, 0], [0.1, 0, 0]], [0, 0], [0, 0])": (
+        "BadScene state: position has the shape [2, 3]; here it must be [2, 2]."
+    ),
+    "sn.at_rest([[0, 0], [0.1, 0]], [0, 0], [0, 0, 0])": (
+        "BadScene state: pusher_position has the shape [3]; here it must be [2]."
+    ),
+    "sn.at_rest([0, 0], 0, [0, 0])": (
+        "BadScene state: position has the shape [2]; here it must be [1, 2]."
+    ),
+    "own.predict(replace(scene, mass=[-0.9, 1]), state, push)": (
+        "BadScene scene: mass is -0.9; it must be from 0.001 to 100 kg."
+    ),
+    "own.predict(replace(scene, radius=[54, 59]), state, push)": (
+        "BadScene scene: radius is 54 (in millimetres?); it must be from 0.001 to 1 m."
+    ),
+    "own.predict(replace(scene, radius=[0.05] * 3), state, push)": (
+        "BadScene scene: radius has the shape [3]; here it must be [2]."
+    ),
+    "own.predict(replace(scene, table_friction=[0.1, 0.2]), state, push)": (
+        "BadScene scene: table_friction has the shape [2]; here it must be []."
+    ),
+    "sn.Push([0.1, 0.2], [0.1, 0.2, 0.3])": (
+        "BadScene push: contact_angle, direction, length and speed have the shapes "
+        "[(2,), (3,), (), ()]; give equal ones, or numbers."
+    ),
+    "own.predict(scene, state, sn.PathControls(still, still[:3]))": (
+        "BadScene push: velocity has the shape [3, 2]; here it must be [4, 2]."
+    ),
+    "own.predict(scene, state, sn.PathControls(still[0], still[0]))": (
+        "BadScene push: its controls have no axis, time; give [time, 2]."
+    ),
+    "own.predict(scene, state, sn.PathControls(still + np.nan, still))": (
+        "BadScene push: position is nan; it must be from -100 to 100 m."
     ),
     'sn.tune("sani", "nowhere")': (
         "BadSetting `model` is sani; it must be one of in, sain, gp (did you mean "
@@ -91,3 +128,8 @@ def test_a_direction_without_training_is_warned_of_once_per_call():
     ]
     first, batch, again = (line.partition(": ")[0] for line in lines)
     assert first != batch == again  # one for each place of the call
+
+
+def test_a_number_of_steps_may_be_one_of_numpy():
+    predict = 'sn.load("physics").predict(scene, state, push, steps=np.int64(7))'
+    assert run(f"{START}print({predict}.states.angle.shape)") == ["(7, 2)"]

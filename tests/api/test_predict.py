@@ -1,5 +1,7 @@
 """Models predict pushes that are given as plain numbers, single or in batches."""
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -320,3 +322,30 @@ def test_controls_without_steps_are_refused(name):
     none = sn.PathControls(jnp.zeros((0, 2)), jnp.zeros((0, 2)))
     with pytest.raises(BadScene, match="push: the controls have no steps; give at"):
         sn.load(name).predict(SCENE, state, none)
+
+
+def test_lists_and_numbers_replace_properties():
+    changed = replace(SCENE, mass=[1, 2], table_friction=0.2)
+    wanted = sn.Scene.disks([1, 2], SCENE.radius, table_friction=0.2)
+    assert eqx.tree_equal(changed, wanted)
+    physics, state = sn.load("physics-true"), SCENE.in_a_row()
+    found = physics.predict(changed, state, sn.Push([0.1, 0.2]))
+    assert eqx.tree_equal(found, physics.predict(wanted, state, sn.Push([0.1, 0.2])))
+
+
+def test_controls_are_lists():
+    physics, state = sn.load("physics-true"), SCENE.in_a_row()
+    path = sn.PathControls([[0, 0]] * 4, [[0, 0]] * 4)
+    assert physics.predict(SCENE, state, path).states.position.shape == (4, 2, 2)
+
+
+def test_arrays_that_change_later_change_nothing():
+    numbers = np.zeros(64, np.float32)
+    start = -numbers.ctypes.data // 4 % 16  # JAX shares memory that is aligned so
+    mass, position = numbers[start : start + 2], np.array([[0.0, 0.0], [0.113, 0.0]])
+    mass[:] = 0.9, 1.0
+    scene = sn.Scene.disks(mass, [0.054, 0.059])
+    state = sn.at_rest(position, np.zeros(2), np.zeros(2))
+    mass[0], position[0] = 50.0, 7.0
+    assert scene.mass[0] < 1
+    assert not np.any(state.position[0])

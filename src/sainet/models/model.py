@@ -16,7 +16,7 @@ from sainet.models.identity import ModelId
 from sainet.models.process_card import ProcessCard
 from sainet.models.push_inputs import (
     check_axes,
-    check_kinds,
+    check_parts,
     compiled,
     is_traced,
     kind_of,
@@ -31,7 +31,7 @@ from sainet.scenes.controls import Controls
 from sainet.scenes.pushes import Push
 from sainet.scenes.quantities import MOST_STEPS, require_count
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, Trajectory, check_state
+from sainet.scenes.state import State, Trajectory
 
 
 @dataclass(frozen=True)
@@ -116,8 +116,8 @@ class Model:
             `trajectory.final` the last state; batches have a leading axis.
 
         Raises:
-            BadScene: a push is out of range, the state is not finite, or the parts do
-                not fit each other.
+            BadScene: a push or a property is out of range, the state is not finite, or
+                the parts do not fit each other.
             BadCheckpoint: the network is for other pushes or another time step.
             BadInput: the model is not JAX, and the push is traced.
             BadSetting: a part is not of its type, or the number of steps is no whole
@@ -125,9 +125,8 @@ class Model:
         """
         if steps is not None:
             require_count("steps", steps, high=MOST_STEPS)
-        check_kinds(scene, state, push)
-        if not is_traced(state):
-            check_state(state)
+            steps = int(steps)  # one of NumPy would be traced
+        check_parts(scene, state, push)
         if scene.body_count != state.body_count:
             raise BadScene(
                 f"state: it has {state.body_count} disks, the scene {scene.body_count}."

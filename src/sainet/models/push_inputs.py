@@ -9,10 +9,18 @@ import numpy as np
 
 from sainet.models.dynamics import AbstractDynamics, predict
 from sainet.runs.errors import BadScene, require
+from sainet.scenes import quantities
 from sainet.scenes.controls import Controls, PathControls
 from sainet.scenes.pushes import Push, PushGrid, check_push, command_path
-from sainet.scenes.scene import TIME_STEP, Scene
-from sainet.scenes.state import State, Trajectory, is_traced
+from sainet.scenes.scene import TIME_STEP, Scene, check_axes_of, check_scene
+from sainet.scenes.state import (
+    State,
+    Trajectory,
+    check_shapes,
+    check_state,
+    is_traced,
+    require_shapes,
+)
 from sainet.worlds.setups import RobotSetup
 
 _USUAL_STEPS = 200  # of pushes whose length or speed is traced, and of no push
@@ -21,13 +29,45 @@ _PARTS = {
     "state": (State, "a State, for example of scene.in_a_row() or at_rest"),
     "push": ((Push, Controls), "a Push, for example Push(0.2), or Controls"),
 }
+# Of controls, by the names of their fields.
+_RANGES = {
+    "position": quantities.POSITION,
+    "velocity": quantities.VELOCITY,
+    "force": quantities.FORCE,
+    "contact_offset": quantities.POSITION,
+}
 _SLACK = 1e-3  # relative tolerance of the training range
 
 
-def check_kinds(*parts: object) -> None:
-    """Raise `BadSetting` unless scene, state and push are such objects."""
-    for given, (name, (kind, wanted)) in zip(parts, _PARTS.items(), strict=True):
-        require(isinstance(given, kind), name, wanted, given)
+def check_parts(scene: Scene, state: State, push: Push | Controls) -> None:
+    """Raise `BadInput` unless scene, state and push are such objects and possible.
+
+    Traced numbers are not checked, nor here parameters of a `Push`.
+    """
+    parts = zip((scene, state, push), _PARTS.items(), strict=True)
+    for given, (name, (kind, wanted)) in parts:
+        is_kind = isinstance(given, kind)  # pyright: ignore
+        require(is_kind, name, wanted, given)
+    check_axes_of(scene)
+    check_shapes(state)
+    if not isinstance(push, Push):
+        _check_controls(push)
+    if not is_traced(scene):
+        check_scene(scene)
+    if not is_traced(state):
+        check_state(state)
+
+
+def _check_controls(controls: Controls) -> None:
+    axes = np.shape(controls.command)[:-1]
+    if not axes:
+        raise BadScene("push: its controls have no axis, time; give [time, 2].")
+    for name, quantity in _RANGES.items():
+        if (values := getattr(controls, name, None)) is not None:
+            own = axes[:-1] if name == "contact_offset" else axes
+            require_shapes(controls, "push", {name: (*own, 2)})
+            if not is_traced(values):
+                quantity.check(values, f"push: {name}", error=BadScene)
 
 
 def untrained(push: Push, *names: str) -> list[str]:

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from sainet.scenes.geometry import rotate
+from sainet.scenes.state import numbers
 
 
 class Pusher(NamedTuple):
@@ -131,8 +132,8 @@ class PathControls(Controls):
         velocity: commanded during each step, [time, 2] (m/s).
     """
 
-    position: Vectors
-    velocity: Vectors
+    position: Vectors = eqx.field(converter=numbers("push: position"))
+    velocity: Vectors = eqx.field(converter=numbers("push: velocity"))
 
     kind: ClassVar[str] = "robot"
 
@@ -199,8 +200,8 @@ class ForceControls(Controls):
         damping: N s/m.
     """
 
-    force: Vectors
-    contact_offset: Vector
+    force: Vectors = eqx.field(converter=numbers("push: force"))
+    contact_offset: Vector = eqx.field(converter=numbers("push: contact_offset"))
     pusher_mass: float = eqx.field(static=True, default=10.0)
     damping: float = eqx.field(static=True, default=1000.0)
 

@@ -6,7 +6,6 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import dtypes
-from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene
@@ -15,7 +14,7 @@ from sainet.scenes.controls import ForceControls, PathControls
 from sainet.scenes.geometry import direction, unit
 from sainet.scenes.quantities import require_count
 from sainet.scenes.scene import Scene
-from sainet.scenes.state import State, at_rest, floats, is_traced
+from sainet.scenes.state import Numbers, State, at_rest, floats, is_traced
 
 _TO_REST = 32 / 240  # s, after a push, at least
 _BRAKING = 1.0  # m/s^2, of a disk that slides on a smooth table
@@ -48,19 +47,22 @@ class Push(eqx.Module):
 
     def __init__(
         self,
-        contact_angle: ArrayLike,
-        direction: ArrayLike = 0.0,
-        length: ArrayLike = 0.010,
-        speed: ArrayLike = 0.050,
+        contact_angle: Numbers,
+        direction: Numbers = 0.0,
+        length: Numbers = 0.010,
+        speed: Numbers = 0.050,
     ) -> None:
         """Return a push, or a batch of pushes.
 
         Args:
-            contact_angle: rad. Numbers and arrays are broadcast against each other;
-                numbers are single precision.
+            contact_angle: rad. Numbers, lists and arrays are broadcast against each
+                other; numbers and lists are single precision.
             direction: rad.
             length: m.
             speed: m/s.
+
+        Raises:
+            BadScene: these are not numbers, or their shapes do not fit each other.
         """
         given = contact_angle, direction, length, speed
         kinds = [np.dtype(getattr(each, "dtype", np.float32)) for each in given]
@@ -68,7 +70,14 @@ class Push(eqx.Module):
         kind = dtypes.canonicalize_dtype(np.result_type(*found))
         named = zip(_PARAMETERS, given, strict=True)
         arrays = [floats(each, f"push: {name}", kind) for name, each in named]
-        arrays = jnp.broadcast_arrays(*arrays)
+        shapes = [each.shape for each in arrays]
+        try:
+            arrays = jnp.broadcast_arrays(*arrays)
+        except ValueError:
+            raise BadScene(
+                f"push: contact_angle, direction, length and speed have the shapes "
+                f"{shapes}; give equal ones, or numbers."
+            ) from None
         self.contact_angle, self.direction, self.length, self.speed = arrays
 
 

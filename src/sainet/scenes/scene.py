@@ -14,7 +14,15 @@ from jaxtyping import Array, Float
 
 from sainet.runs.errors import BadScene, shown
 from sainet.scenes.quantities import PROPERTIES, TIME_STEP_RANGE
-from sainet.scenes.state import Numbers, State, floats, in_a_row, is_traced
+from sainet.scenes.state import (
+    Numbers,
+    State,
+    floats,
+    in_a_row,
+    is_traced,
+    numbers,
+    require_shapes,
+)
 
 GRAVITY = 9.81  # m/s^2
 TIME_STEP = 1 / 240  # s, the paper's
@@ -67,12 +75,20 @@ class Scene(eqx.Module):
         time_step: s, one number for a batch.
     """
 
-    mass: Float[Array, "*batch body"]
-    radius: Float[Array, "*batch body"]
-    table_friction: Float[Array, "*batch"]
-    disk_friction: Float[Array, "*batch"]
-    pusher_friction: Float[Array, "*batch"]
-    pusher_radius: Float[Array, "*batch"]
+    mass: Float[Array, "*batch body"] = eqx.field(converter=numbers("scene: mass"))
+    radius: Float[Array, "*batch body"] = eqx.field(converter=numbers("scene: radius"))
+    table_friction: Float[Array, "*batch"] = eqx.field(
+        converter=numbers("scene: table_friction")
+    )
+    disk_friction: Float[Array, "*batch"] = eqx.field(
+        converter=numbers("scene: disk_friction")
+    )
+    pusher_friction: Float[Array, "*batch"] = eqx.field(
+        converter=numbers("scene: pusher_friction")
+    )
+    pusher_radius: Float[Array, "*batch"] = eqx.field(
+        converter=numbers("scene: pusher_radius")
+    )
     friction_field: FrictionField | None = None
     time_step: float = eqx.field(static=True, default=TIME_STEP)
 
@@ -169,6 +185,13 @@ def _count(name: str, values: Any) -> int:  # noqa: ANN401
 
 
 _row = eqx.filter_jit(in_a_row)  # a dozen small operations in one
+
+
+def check_axes_of(scene: Scene) -> None:
+    """Raise `BadScene` unless all fields have the axes of the masses."""
+    axes = np.shape(scene.mass) or (1,)
+    single = {each: axes[:-1] for each in PROPERTIES if np.ndim(getattr(scene, each))}
+    require_shapes(scene, "scene", single | {"mass": axes, "radius": axes})
 
 
 def check_scene(scene: Scene, source: str = "scene") -> None:

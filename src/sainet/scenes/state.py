@@ -3,7 +3,7 @@
 Units are metres, radians, kilograms and seconds, in the table frame.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import equinox as eqx
@@ -17,6 +17,49 @@ from jaxtyping import Array, Float
 from sainet.runs.errors import BadScene, shown
 
 Numbers = ArrayLike | Sequence[Any]  # an array, or lists of numbers
+
+
+def floats(
+    numbers: Numbers, where: str, dtype: type[np.floating] | np.dtype | None = None
+) -> Array:
+    """Return numbers as an array of their own, which may be traced.
+
+    Args:
+        numbers: floating-point numbers keep their precision without `dtype`.
+        where: the argument, as messages name it.
+        dtype: of the array; None: single precision.
+
+    Raises:
+        BadScene: they are not numbers.
+    """
+    try:
+        if dtype is None and _are_floats(numbers):
+            own = isinstance(numbers, Array)
+            return cast(Array, numbers) if own else jnp.array(numbers)
+        return jnp.array(numbers, dtype or np.float32)  # `asarray` may share memory
+    except (TypeError, ValueError):
+        raise BadScene(f"{where} is {shown(numbers)}; give numbers.") from None
+
+
+def require_shapes(
+    part: object, where: str, wanted: Mapping[str, tuple[int, ...]]
+) -> None:
+    """Raise `BadScene` unless fields have these shapes; `where` names the part."""
+    for name, shape in wanted.items():
+        if (found := np.shape(getattr(part, name))) != shape:
+            raise BadScene(
+                f"{where}: {name} has the shape {list(found)}; here it must be "
+                f"{list(shape)}."
+            )
+
+
+def numbers(where: str) -> Callable[[Numbers], Array]:
+    """Return `floats` for a field, which messages name so; arrays of floats stay."""
+    return lambda x: cast(Array, x) if _are_floats(x) else floats(x, where)
+
+
+def _are_floats(numbers: Numbers) -> bool:
+    return np.dtype(getattr(numbers, "dtype", int)).kind == "f"
 
 
 class State(eqx.Module):
@@ -33,12 +76,20 @@ class State(eqx.Module):
         pusher_velocity: [2] (m/s).
     """
 
-    position: Float[Array, "*batch body 2"]
-    angle: Float[Array, "*batch body"]
-    velocity: Float[Array, "*batch body 2"]
-    spin: Float[Array, "*batch body"]
-    pusher_position: Float[Array, "*batch 2"]
-    pusher_velocity: Float[Array, "*batch 2"]
+    position: Float[Array, "*batch body 2"] = eqx.field(
+        converter=numbers("state: position")
+    )
+    angle: Float[Array, "*batch body"] = eqx.field(converter=numbers("state: angle"))
+    velocity: Float[Array, "*batch body 2"] = eqx.field(
+        converter=numbers("state: velocity")
+    )
+    spin: Float[Array, "*batch body"] = eqx.field(converter=numbers("state: spin"))
+    pusher_position: Float[Array, "*batch 2"] = eqx.field(
+        converter=numbers("state: pusher")
+    )
+    pusher_velocity: Float[Array, "*batch 2"] = eqx.field(
+        converter=numbers("state: pusher")
+    )
 
     @property
     def body_count(self) -> int:
@@ -100,11 +151,14 @@ def at_rest(position: Numbers, angle: Numbers, pusher_position: Numbers) -> Stat
         position: of the disks, [body, 2] (m); lists or arrays, also with leading axes.
         angle: of the disks, [body] (rad).
         pusher_position: [2] (m).
+
+    Raises:
+        BadScene: these are not numbers, or their shapes do not fit each other.
     """
     position = floats(position, "state: position")
     angle = floats(angle, "state: angle")
     pusher_position = floats(pusher_position, "state: pusher_position")
-    return State(
+    found = State(
         position=position,
         angle=angle,
         velocity=jnp.zeros_like(position),
@@ -112,28 +166,8 @@ def at_rest(position: Numbers, angle: Numbers, pusher_position: Numbers) -> Stat
         pusher_position=pusher_position,
         pusher_velocity=jnp.zeros_like(pusher_position),
     )
-
-
-def floats(
-    numbers: Numbers, where: str, dtype: type[np.floating] | np.dtype | None = None
-) -> Array:
-    """Return numbers as an array, which may be traced.
-
-    Args:
-        numbers: arrays of floating-point numbers stay as they are without `dtype`.
-        where: the argument, as messages name it.
-        dtype: of the array; None: single precision.
-
-    Raises:
-        BadScene: they are not numbers.
-    """
-    kind = np.dtype(getattr(numbers, "dtype", int)).kind
-    if kind == "f" and dtype is None:
-        return cast(Array, numbers)
-    try:
-        return jnp.asarray(numbers, dtype or np.float32)
-    except (TypeError, ValueError):
-        raise BadScene(f"{where} is {shown(numbers)}; give numbers.") from None
+    check_shapes(found)
+    return found
 
 
 def is_traced(tree: object) -> bool:
@@ -186,6 +220,15 @@ def unpack_motion(
         pusher_position=pusher_position,
         pusher_velocity=pusher_velocity,
     )
+
+
+def check_shapes(state: State, source: str = "state") -> None:
+    """Raise `BadScene` unless all fields have the axes of the angles."""
+    axes = np.shape(state.angle) or (1,)
+    body, pusher = (*axes, 2), (*axes[:-1], 2)
+    wanted = {"position": body, "angle": axes, "velocity": body, "spin": axes}
+    wanted |= {"pusher_position": pusher, "pusher_velocity": pusher}
+    require_shapes(state, source, wanted)
 
 
 def check_state(state: State, source: str = "state") -> None:
