@@ -19,7 +19,7 @@ from sainet.models.identity import ModelId
 from sainet.models.model import Model
 from sainet.models.push_inputs import is_traced
 from sainet.runs.documents import checked
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, require
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory, unpack_motion
@@ -243,6 +243,7 @@ def from_step(step: Step, *, name: str, numpy: bool = False, version: int = 1) -
     Raises:
         BadInput: the name has other characters.
     """
+    require(callable(step), "step", "a function", step)
     spec = checked(OwnSpec(name=name, version=version), "engine")
     kind = HostStepEngine if numpy else StepEngine
     return own_model(kind(step=step, name=name), spec)

@@ -11,7 +11,7 @@ import numpy as np
 from sainet.models.dynamics import AbstractDynamics, Given
 from sainet.models.identity import ModelId
 from sainet.models.model import Model
-from sainet.runs.errors import BadInput
+from sainet.runs.errors import BadInput, require
 from sainet.scenes.controls import Controls
 from sainet.scenes.scene import Scene
 from sainet.scenes.state import State, Trajectory
@@ -76,13 +76,22 @@ class FunctionDynamics(AbstractDynamics):
 
     def _poses(self, scene: Scene, initial: State, controls: Controls) -> np.ndarray:
         given = jax.tree.map(np.asarray, (scene, initial, controls))
-        poses = np.asarray(self.function(*given))
+        found = self.function(*given)
+        try:
+            poses = np.asarray(found)
+        except ValueError:  # rows of different lengths
+            poses = np.array(None)
         pushes, steps = controls.command.shape[:2]
         wanted = (pushes, steps, initial.body_count, 3)
         if poses.shape != wanted:
             raise BadInput(
                 f"{self.name}: its function returns the shape {list(poses.shape)}; it "
                 f"must be {list(wanted)}: push, time, body, pose (m, m, rad)."
+            )
+        if poses.dtype.kind != "f":  # whole numbers of metres are no poses
+            raise BadInput(
+                f"{self.name}: its function returns numbers of the type {poses.dtype}; "
+                "it must return floating-point numbers (m, m, rad)."
             )
         return poses
 
@@ -122,4 +131,5 @@ def from_function(function: Predict, *, name: str) -> Model:
             (m/s). A later step must not change an earlier pose.
         name: of the model in tables.
     """
+    require(callable(function), "function", "a function", function)
     return Model(ModelId(kind="physics", name=name), FunctionDynamics(function, name))

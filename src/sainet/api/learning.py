@@ -1,6 +1,7 @@
 """Identification and training in scripts."""
 
 from contextlib import AbstractContextManager, nullcontext
+from numbers import Integral
 from os import PathLike, fspath
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -118,7 +119,7 @@ def tune(
         Diverged: the loss became NaN or infinite.
     """
     require_one_of("model", model, LEARNED)
-    given = {"iterations": iterations, "seed": seed}
+    given = {"iterations": _plain(iterations), "seed": _plain(seed)}
     if model == "gp":
         if recipe is not None or start != FROM_ENGINE:
             raise BadInput("`recipe` and `start` are of networks; leave them out.")
@@ -144,6 +145,10 @@ def tune(
             )
         found = load(folder)
     return found if out is not None else found.without_folder()
+
+
+def _plain(number: int | None) -> int | None:
+    return int(number) if isinstance(number, Integral) else number  # of NumPy
 
 
 def _recipe(start: Folder | Model, recipe: Recipe | None) -> Recipe:

@@ -149,7 +149,7 @@ def open_pushes(path: Path | str) -> Pushes:
     Raises:
         BadStore: the dataset is missing, unfinished, damaged or of another format.
     """
-    return Pushes(open_store(path))
+    return Pushes(store_of(path))
 
 
 def generate(
@@ -170,6 +170,8 @@ def generate(
         RunConflict: the folder belongs to another run.
         BadInput: a scene has no room for its disks, or an engine cannot have as many.
     """
+    is_config = isinstance(config, GenerateConfig)  # pyright: ignore
+    require(is_config, "config", "a GenerateConfig", config)
     folder = TemporaryFolder() if out is None else None
     path = folder.path if folder else Path(out or "")
     with shown_progress("Simulating", config.pushes, progress) as advance:
@@ -181,4 +183,8 @@ def store_of(pushes: Dataset) -> Store:
     """Return the dataset of pushes that are given in any form."""
     if isinstance(pushes, Pushes):
         return pushes.store
-    return pushes if isinstance(pushes, Store) else open_store(pushes)
+    if isinstance(pushes, Store):
+        return pushes
+    is_path = isinstance(pushes, Path | str)  # pyright: ignore
+    require(is_path, "pushes", "a dataset, or its folder", pushes)
+    return open_store(pushes)

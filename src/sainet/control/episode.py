@@ -10,7 +10,7 @@ from sainet.identification.adaptation import Adaptation
 from sainet.models.library import Loadable, as_model
 from sainet.planning.base import AbstractPlanner, Plan
 from sainet.robots.base import AbstractRobot
-from sainet.runs.errors import BadScene, Diverged
+from sainet.runs.errors import BadScene, Diverged, require
 from sainet.scenes.pushes import Push
 from sainet.scenes.recording import Recording
 from sainet.scenes.scene import Scene, check_scene
@@ -93,8 +93,11 @@ def run_episode(
 
     Raises:
         BadScene: a property is out of its range.
+        BadSetting: the planner is none, but a name for example.
     """
     check_scene(scene)
+    wanted = "a planner, for example that of make_planner"
+    require(hasattr(planner, "plan"), "planner", wanted, planner)
     given = as_model(model).dynamics, scene
     episode = episode or Episode()
     troubles = 0

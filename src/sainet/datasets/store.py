@@ -186,8 +186,8 @@ def _indices(rows: Iterable[int] | np.ndarray) -> list[int]:
     Raises:
         BadInput: they are of another type, or have other axes.
     """
-    found = np.asarray(rows if isinstance(rows, np.ndarray) else list(rows))
-    if found.size and (found.dtype.kind not in "iu" or found.ndim != 1):
+    found = np.asarray([*rows] if isinstance(rows, Iterable) else rows)  # pyright: ignore
+    if found.ndim != 1 or (found.size and found.dtype.kind not in "iu"):
         raise BadInput(
             f"`rows` is {shown(found)}; it must be whole numbers, the indices of "
             "pushes (of a mask, use `np.flatnonzero`)."

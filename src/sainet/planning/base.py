@@ -15,6 +15,7 @@ from sainet.models.dynamics import AbstractDynamics, check_purpose
 from sainet.models.library import Loadable, as_model
 from sainet.planning.checks import check_observation, doubts
 from sainet.planning.levels import Found, Problem, batch_of, predicted_ends, roll_pushes
+from sainet.runs.errors import require
 from sainet.scenes.controls import PathControls
 from sainet.scenes.pushes import Push, PushGrid, settled_steps
 from sainet.scenes.scene import Scene
@@ -78,6 +79,8 @@ class AbstractPlanner(eqx.Module):
             BadCheckpoint: the model is for another time step or other controls.
             Diverged: no candidate push has a finite prediction.
         """
+        is_task = hasattr(task, "seen_from")
+        require(is_task, "task", "a task, for example PushToGoal([0.2, 0.05])", task)
         dynamics, kind = as_model(model).dynamics, PathControls.kind
         disks = scene.body_count
         check_purpose(dynamics, kind, scene.time_step, disks)

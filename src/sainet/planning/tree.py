@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from numbers import Real
 
 import equinox as eqx
 import jax
@@ -38,7 +39,8 @@ class TreePlanner(AbstractPlanner):
         require_count("beam", self.beam)
         require_count("block", self.block)
         deadline = 0.0 if self.deadline is None else self.deadline
-        require(not np.isnan(deadline), "deadline", "a number of seconds", deadline)
+        good = isinstance(deadline, Real) and float(deadline) >= 0
+        require(good, "deadline", "a number of seconds", deadline)
 
     def search(self, problem: Problem) -> Found:
         """Return the best sequence of one, two or, near the goal, three pushes."""

@@ -123,10 +123,10 @@ def missing_extra(needs: str, extra: str, instead: str = "") -> MissingExtra:
     return MissingExtra(f"{needs}: pip install 'sainet[{extra}]'{otherwise}.")
 
 
-def hint(name: str, known: Iterable[str]) -> str:
+def hint(name: object, known: Iterable[str]) -> str:
     """Return " (did you mean ...?)" with the most similar known name, or nothing."""
     in_lower_case = {each.lower(): each for each in known}
-    nearest = get_close_matches(name[:_LONGEST_SHOWN].lower(), in_lower_case, n=1)
+    nearest = get_close_matches(shown(name).lower(), in_lower_case, n=1)
     return f" (did you mean {in_lower_case[nearest[0]]}?)" if nearest else ""
 
 

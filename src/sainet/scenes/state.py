@@ -34,8 +34,7 @@ def floats(
     """
     try:
         if dtype is None and _are_floats(numbers):
-            own = isinstance(numbers, Array)
-            return cast(Array, numbers) if own else jnp.array(numbers)
+            return numbers if isinstance(numbers, Array) else jnp.array(numbers)
         return jnp.array(numbers, dtype or np.float32)  # `asarray` may share memory
     except (TypeError, ValueError):
         raise BadScene(f"{where} is {shown(numbers)}; give numbers.") from None

@@ -96,6 +96,8 @@ class WorldConfig:
         Raises:
             BadSetting: a value is out of its range.
         """
+        is_noise = isinstance(self.noise, NoiseConfig)  # pyright: ignore
+        require(is_noise, "noise", "a NoiseConfig", self.noise)
         require_one_of("noise_level", self.noise_level, get_args(NoiseLevel))
         require_one_of("arrangement", self.arrangement, get_args(Arrangement))
         for name, (low, high) in _COUNTS.items():
