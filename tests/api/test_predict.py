@@ -158,6 +158,24 @@ def test_derivatives_pass_through_a_prediction():
     assert abs(slope) > 1e-3  # m/rad
 
 
+@pytest.mark.parametrize("name", ["in", "sain-any"])
+def test_derivatives_of_networks_are_exact_in_any_unit(name):
+    """Training bounds gradients; predictions do not, and have both modes."""
+    network, state, angle = sn.load(name), SCENE.in_a_row(), jnp.float32(0.2)
+
+    def sideways(angle, unit=1.0):
+        found = network.predict(SCENE, state, sn.Push(angle), steps=60)
+        return unit * found.final.position[0, 1]
+
+    slope, step = float(jax.grad(sideways)(angle)), 0.01
+    large = float(jax.grad(sideways)(angle, 1e4))
+    assert large == pytest.approx(1e4 * slope, rel=1e-3)
+    forward = float(jax.jvp(sideways, [angle], [jnp.float32(1)])[1])
+    assert forward == pytest.approx(slope, rel=1e-3)
+    difference = float(sideways(angle + step) - sideways(angle - step)) / (2 * step)
+    assert slope == pytest.approx(difference, rel=0.05)
+
+
 def test_controls_predict_as_the_push_that_they_are_of(model):
     push = sn.Push(contact_angle=0.2)
     initial, controls = command_path(SCENE, SCENE.in_a_row(), push, steps=60)

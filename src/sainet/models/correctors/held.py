@@ -27,6 +27,7 @@ def unroll_held(
     *,
     before: Float[Array, "push body 6"],
     hold: int,
+    is_bounded: bool = True,
 ) -> Float[Array, "time push body 6"]:
     """Predict like `unroll`, applying an additive network every few steps.
 
@@ -37,6 +38,7 @@ def unroll_held(
         drive: with axes ``[push, time, ...]``.
         before: packed motion of the engine at the start.
         hold: steps over which f_dyn is held; 1 equals `unroll`.
+        is_bounded: bound gradients as training does; False: exact gradients.
     """
     integrator = network.integrator
     assert isinstance(integrator, RelaxingResidual)
@@ -48,7 +50,7 @@ def unroll_held(
     @jax.checkpoint
     def body(deviation: Array, now: tuple[Array, Drive]) -> tuple[Array, Array]:
         engine, drive = now
-        deviation = bound_gradient(deviation)
+        deviation = bound_gradient(deviation) if is_bounded else deviation
         change = network.acceleration(Moment(engine + deviation, still, drive))
         path = _held(deviation, change, gain)
         return path[-1], path

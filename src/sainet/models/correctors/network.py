@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -127,7 +128,8 @@ class AbstractNetwork(AbstractCorrector):
     ) -> Prediction:
         """Predict the states after each step of the controls."""
         path = None if simulated is None else pack_motion(simulated.states)
-        local = self.in_frame(scene, start, controls, path)
+        exact = partial(self.unroll, is_bounded=False)
+        local = self.in_frame(scene, start, controls, path, unroll=exact)
         motion = jax.vmap(motion_from_frame, in_axes=(0, None), out_axes=1)(
             local, start.frame
         )
@@ -150,7 +152,8 @@ class AbstractNetwork(AbstractCorrector):
             start: of each push.
             controls: in the table frame.
             simulated: packed s-bar after each step, in the table frame; None for IN.
-            unroll: instead of the network's own, the zero-order hold of training.
+            unroll: instead of the network's own: the zero-order hold of training, or
+                one with exact gradients.
         """
         self.made_for.check_disks(scene.body_count)
         frame = self.features.axes(start.frame)
@@ -207,6 +210,7 @@ def unroll(
     drive: Drive,
     *,
     before: Float[Array, "push body 6"] | None = None,
+    is_bounded: bool = True,
 ) -> Float[Array, "time push body 6"]:
     """Predict recurrently from each initial motion, all in the push frame (eq. 1).
 
@@ -216,6 +220,7 @@ def unroll(
         still: for each push.
         drive: with axes ``[push, time, ...]``.
         before: packed motion of the engine at the start, for forms that need it.
+        is_bounded: bound gradients as training does; False: exact gradients.
 
     Returns:
         The packed motion after each step, time first.
@@ -225,7 +230,8 @@ def unroll(
 
     @jax.checkpoint
     def body(motion: Array, now: Drive) -> tuple[Array, Array]:
-        motion = network.step(integrators.bound_gradient(motion), still, now)
+        motion = integrators.bound_gradient(motion) if is_bounded else motion
+        motion = network.step(motion, still, now)
         return motion, motion
 
     time_first = jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), drive)
