@@ -359,7 +359,8 @@ CONNECTIONS = {
     "choice of inputs and kernels, ensembles in cross-validation": 14,
     "ensembles": 62,
     "provenance of identified engines": 10,
-    "wrong arguments, settings without effect, full disks": 89,
+    # Also types, shapes and ranges of scenes, states and controls: 68.
+    "wrong arguments, settings without effect, full disks": 157,
     "models of a user's own in control": 34,
     # A figure on every page since: 34 more.
     "figures, main tables and headlines of pages of results": 116,
@@ -416,8 +417,9 @@ COUNTS = {
         # what is said of wrong arguments: 126 lines more than before. Figures of errors
         # disk by disk and of ranges: 50 more. Leading axes of controls, bounds in
         # single precision, numbers of pushes and steps: 9. Predictions of pushes with
-        # one hash, engines of one name, types of settings: 23.
-        3_697,
+        # one hash, engines of one name, types of settings: 23. Shapes and ranges of
+        # controls, what functions and datasets are given: 49.
+        3_746,
         3_540,
     ),
     "code lines of engines from MJCF": (

@@ -79,9 +79,9 @@ class AbstractPlanner(eqx.Module):
             BadCheckpoint: the model is for another time step or other controls.
             Diverged: no candidate push has a finite prediction.
         """
+        dynamics, kind = as_model(model).dynamics, PathControls.kind
         is_task = hasattr(task, "seen_from")
         require(is_task, "task", "a task, for example PushToGoal([0.2, 0.05])", task)
-        dynamics, kind = as_model(model).dynamics, PathControls.kind
         disks = scene.body_count
         check_purpose(dynamics, kind, scene.time_step, disks)
         gap = check_observation(scene, state)

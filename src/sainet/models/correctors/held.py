@@ -55,8 +55,8 @@ def unroll_held(
         path = _held(deviation, change, gain)
         return path[-1], path
 
-    start = in_columns(initial - before)
-    path = lax.scan(body, start, (engine, held))[1]  # [block, step, 6, body, push]
+    # [block, step, 6, body, push]
+    path = lax.scan(body, in_columns(initial - before), (engine, held))[1]
     steps = simulated.shape[1] - 1
     deviation = jax.vmap(in_columns)(path.reshape(-1, *path.shape[2:])[:steps])
     return _time_first(simulated[:, 1:]) + deviation
