@@ -8,12 +8,17 @@ pyproject.toml.
 import gc
 import os
 import shutil
+import signal
 import sys
 from collections.abc import Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
+
+# Shells start background jobs with Ctrl-C ignored; tests press it in what they start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Before the first import of numpy. The threads of OpenBLAS wait in a loop: with two
 # workers on two cores, small products of matrices take three times the processor time.
