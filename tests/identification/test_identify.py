@@ -132,7 +132,7 @@ def test_intervals_of_a_linear_problem_are_those_of_a_normal_mean(
     for value in (mean, mean + 3 * error):  # a step leads to the solution
         found = intervals({"camera_x_mm": value}, *problem)
         ends = (np.array(found["camera_x_mm"]) - mean) / error
-        np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.2)
+        np.testing.assert_allclose(ends, [-1.96, 1.96], atol=0.12)
     wrong_by += 5  # mm: the end of the search range
     assert intervals({"camera_x_mm": mean + 5}, *problem)["camera_x_mm"][1] == 5.0
 
